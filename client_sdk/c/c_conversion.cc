@@ -92,6 +92,14 @@ absl::StatusOr<v1::Frame> ToFrame(carillon_frame frame) {
       absl::StrCat("the frame is ", frame, ": give CARILLON_FRAME_OBJECT or CARILLON_FRAME_SCENE"));
 }
 
+absl::Status CheckStep(double step_s) {
+  if (step_s >= 1e-6 && step_s <= 1) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                 absl::StrCat("step_s is ", step_s,
+                              "; say the simulator's step, from 1e-6 to 1 s (1/240 is 0 in C, "
+                              "1.0/240 is not)"));
+}
+
 absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
                                     std::span<const uint32_t> triangles) {
   const size_t vertex_count = vertices_m.size() / 3;
@@ -112,7 +120,13 @@ absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
   return text;
 }
 
-v1::ContactStep ToStep(const carillon_step& step) {
+absl::StatusOr<v1::ContactStep> ToStep(const carillon_step& step) {
+  if ((step.contacts == nullptr && step.contact_count > 0) ||
+      (step.impulses == nullptr && step.impulse_count > 0) ||
+      (step.poses == nullptr && step.pose_count > 0)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   "an array of the step is a null pointer, and its count is above zero");
+  }
   v1::ContactStep made;
   made.set_time_s(step.time_s);
   for (size_t i = 0; i < step.contact_count; ++i) Set(step.contacts[i], *made.add_contacts());

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/contact.pb.h"
 #include "carillon/v1/hearing.pb.h"
@@ -42,6 +43,10 @@ void Fill(const carillon_hearing* hearing, Message& message) {
   *message.mutable_listener() = ToPose(hearing->listener);
 }
 
-v1::ContactStep ToStep(const carillon_step& step);
+/// Errors: InvalidArgument (INVALID_SETTINGS: a null array of elements).
+absl::StatusOr<v1::ContactStep> ToStep(const carillon_step& step);
+
+/// Checks the length of a simulator's steps, seconds. Errors: InvalidArgument (INVALID_STREAM).
+absl::Status CheckStep(double step_s);
 
 }  // namespace carillon::c

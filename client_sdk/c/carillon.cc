@@ -17,7 +17,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "carillon/client.h"
+#include "carillon/contact_warnings.h"
 #include "carillon/lasting_stream.h"
 #include "client_sdk/c/c_conversion.h"
 #include "proto/cpp/error_reason.h"
@@ -50,6 +52,7 @@ namespace v1 = carillon::v1;
 
 thread_local std::string last_error;
 thread_local std::string last_reason;
+thread_local std::string last_warnings;
 
 carillon_code Keep(const absl::Status& status) {
   if (status.ok()) return CARILLON_OK;
@@ -89,8 +92,14 @@ absl::Status CreateModel(const carillon::client::Client& daemon, const std::stri
   return absl::OkStatus();
 }
 
+void KeepWarnings(const v1::StreamContactsResponse& report, uint64_t dropped_step_count) {
+  last_warnings =
+      absl::StrJoin(carillon::client::ContactWarnings(report, dropped_step_count), "\n");
+}
+
 absl::StatusOr<carillon_sound> Render(const carillon::client::Client& daemon,
                                       const std::string& file, const v1::RenderSettings& settings) {
+  last_warnings.clear();
   ASSIGN_OR_RETURN(auto trace, carillon::client::ContactTraceReader::Open(file));
   std::vector<float> samples;
   carillon_sound sound = {};
@@ -105,6 +114,10 @@ absl::StatusOr<carillon_sound> Render(const carillon::client::Client& daemon,
     return Refusal(absl::StatusCode::kInvalidArgument, summary.last_rejection().reason(),
                    summary.last_rejection().message());
   }
+  v1::StreamContactsResponse report;
+  *report.mutable_findings() = summary.findings();
+  report.set_accepted_count(summary.accepted_count());
+  KeepWarnings(report, 0);
   auto owned = std::make_unique<float[]>(samples.size());
   std::ranges::copy(samples, owned.get());
   sound.samples = owned.release();
@@ -119,6 +132,7 @@ extern "C" {
 const char* carillon_version(void) { return CARILLON_VERSION; }
 const char* carillon_error(void) { return last_error.c_str(); }
 const char* carillon_error_reason(void) { return last_reason.c_str(); }
+const char* carillon_warnings(void) { return last_warnings.c_str(); }
 
 carillon_code carillon_connect(const char* server, carillon_client** client) {
   return Try([&]() -> absl::Status {
@@ -262,7 +276,8 @@ carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillo
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step) {
   return Try([&]() -> absl::Status {
     if (!stream || !step) return Missing("an argument");
-    return stream->stream->Send(carillon::c::ToStep(*step));
+    ASSIGN_OR_RETURN(v1::ContactStep made, carillon::c::ToStep(*step));
+    return stream->stream->Send(std::move(made));
   });
 }
 
@@ -270,7 +285,9 @@ carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* re
   if (stream == nullptr) return CARILLON_OK;
   const std::unique_ptr<carillon_stream> owned(stream);
   return Try([&]() -> absl::Status {
+    last_warnings.clear();
     ASSIGN_OR_RETURN(const v1::StreamContactsResponse last, stream->stream->Finish());
+    KeepWarnings(last, stream->stream->DroppedStepCount());
     if (report == nullptr) return absl::OkStatus();
     *report = {.step_count = last.step_count(),
                .accepted_count = last.accepted_count(),
@@ -285,6 +302,7 @@ carillon_code carillon_create_trace(const char* file, double step_s, carillon_fr
                                     const carillon_hearing* hearing, carillon_trace** trace) {
   return Try([&]() -> absl::Status {
     if (!file || !trace) return Missing("an argument");
+    RETURN_IF_ERROR(carillon::c::CheckStep(step_s));
     v1::ContactTraceHeader header;
     header.set_step_s(step_s);
     ASSIGN_OR_RETURN(const v1::Frame given, carillon::c::ToFrame(frame));
@@ -313,7 +331,8 @@ carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step) {
   return Try([&]() -> absl::Status {
     if (!trace || !step) return Missing("an argument");
-    trace->writer.Write(carillon::c::ToStep(*step));
+    ASSIGN_OR_RETURN(const v1::ContactStep made, carillon::c::ToStep(*step));
+    trace->writer.Write(made);
     return absl::OkStatus();
   });
 }

@@ -74,9 +74,9 @@ typedef struct carillon_contact {
   uint32_t object;
   carillon_vec3 point_m;
   carillon_vec3 impulse_newton_seconds; /**< on the object over the step, friction included */
-  uint32_t partner;                     /**< any number that names the other body */
-  double travel_speed_m_per_s;          /**< along a rough surface; zero: no roughness */
-  double roughness_depth;               /**< relative to the force */
+  uint32_t partner; /**< any number that names the other body, the same one in each step */
+  double travel_speed_m_per_s; /**< along a rough surface; zero: no roughness */
+  double roughness_depth;      /**< relative to the force */
 } carillon_contact;
 
 /** A blow that the caller intends, such as that of a hammer. */
@@ -161,10 +161,16 @@ typedef struct carillon_sound {
 /** The version of this library, such as "0.1.0". */
 const char* carillon_version(void);
 /** Returns the error of this thread's last failed call: the reason, a colon and a text. Returns an
- * empty text if no call of this thread has failed. */
+ * empty text if no call of this thread has failed. The text is valid until the next call of this
+ * thread fails. */
 const char* carillon_error(void);
 /** Returns the reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
 const char* carillon_error_reason(void);
+/** Returns what was probably wrong with the contacts of the stream that this thread has closed
+ * last, or of the trace that it has rendered last: a sentence in each line, such as that points lie
+ * far from their objects. Returns an empty text if nothing was found. The text is valid until this
+ * thread closes a stream or renders again. */
+const char* carillon_warnings(void);
 
 /** Connects to the daemon at "unix:PATH" or "HOST:PORT", or to the default daemon if `server` is
  * null, and waits for its answer. */
@@ -190,7 +196,8 @@ carillon_code carillon_create_scene(carillon_client* client, const carillon_hear
 carillon_code carillon_register_scene(carillon_client* client,
                                       const carillon_registration* registration,
                                       carillon_scene** scene);
-/** Fades out the objects of the scene and deletes it. */
+/** Fades out the objects of the scene and deletes it. The pointer must not be used again, which
+ * holds for all that a function ends. */
 void carillon_delete_scene(carillon_scene* scene);
 /** Returns the name of the scene, "scenes/{id}". The text is valid until the scene is deleted. */
 const char* carillon_scene_name(const carillon_scene* scene);

@@ -86,7 +86,8 @@ class CClientTest(DaemonTest):
                        stdout=subprocess.DEVNULL)
         cls.library = next(cls.prefix.rglob("libcarillon.so"))
         cls.c = ctypes.CDLL(str(cls.library))
-        cls.c.carillon_error.restype = cls.c.carillon_error_reason.restype = ctypes.c_char_p
+        for text in (cls.c.carillon_error, cls.c.carillon_error_reason, cls.c.carillon_warnings):
+            text.restype = ctypes.c_char_p
         cls.c.carillon_scene_name.restype = ctypes.c_char_p
         cls.c.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p]
         cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p,
@@ -126,6 +127,56 @@ class CClientTest(DaemonTest):
                                 stdin=subprocess.DEVNULL, capture_output=True, text=True)
         self.assertEqual(failed.returncode, 1)
         self.assertIn("strike: MESH_FILE_NOT_READABLE: none.obj", failed.stderr)
+
+    def test_what_is_probably_wrong_with_contacts_is_told(self):
+        scene, stream, handle, report = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_uint32(), Report()
+        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
+        self.assertEqual(code, 0)
+        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
+        self.addCleanup(self.c.carillon_delete_scene, scene)
+        bar = Object(model.encode(), meshes.MATERIAL.encode())
+        self.assertEqual(self.c.carillon_add_object(scene, ctypes.byref(bar), ctypes.byref(handle)), 0)
+
+        def warnings_of(*impulses):
+            self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
+            for number, impulse in enumerate(impulses):
+                step = Step(time_s=number / 60, impulses=ctypes.pointer(impulse), impulse_count=1)
+                self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
+                time.sleep(1 / 60)
+            for name in ("contact_count", "impulse_count", "pose_count"):
+                empty = Step(time_s=len(impulses) / 60, **{name: 3})
+                self.assertEqual(self.c.carillon_send(stream, ctypes.byref(empty)), 3)
+                self.assertRegex(self.c.carillon_error(), b"^INVALID_SETTINGS: an array of the step is a null pointer")
+            self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0)
+            return self.c.carillon_warnings().decode().splitlines()
+
+        point, blow = Vec3(0.1, 0.015, 0.01), Vec3(0, 0, -1e-3)
+        self.assertEqual(warnings_of(Impulse(handle, point, blow)), [])
+        far, lost = warnings_of(Impulse(99, point, blow), Impulse(handle, Vec3(100, 15, 10), blow))[::-1]
+        self.assertRegex(far, "^1 contact lies up to 10.* m away")
+        self.assertRegex(lost, "^1 contact was rejected, the last one with OBJECT_NOT_FOUND: ")
+        for step_s in (0, -1, 10, float("nan")):
+            self.assertEqual(self.c.carillon_create_trace(b"x.contacts", step_s, 0, None, ctypes.byref(stream)), 3)
+            self.assertRegex(self.c.carillon_error(), b"^INVALID_STREAM: step_s is .* from 1e-6 to 1 s")
+
+    def test_what_the_daemon_cannot_read_is_refused_with_a_reason(self):
+        scene, stream, trace, sound = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p(), Sound()
+        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
+        self.addCleanup(self.c.carillon_delete_scene, scene)
+        self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
+        many = (Impulse * 100_000)(*(Impulse(1, Vec3(1, 1, 1), Vec3(1, 1, 1)) for _ in range(100_000)))
+        step = Step(impulses=many, impulse_count=len(many))
+        self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 3)
+        self.assertRegex(self.c.carillon_error(), b"^STEP_TOO_LARGE: a step of .* bytes: the daemon takes at most")
+        self.assertEqual(self.c.carillon_close_stream(stream, None), 0)
+        bar = Object(b"modalModels/\xff", meshes.MATERIAL.encode())
+        self.assertEqual(self.c.carillon_add_object(scene, ctypes.byref(bar), None), 3)
+        self.assertRegex(self.c.carillon_error(), b"^REQUEST_MALFORMED: .* text in UTF-8")
+        file = str(self.folder / "empty.contacts").encode()
+        self.assertEqual(self.c.carillon_create_trace(file, 1 / 60, 0, None, ctypes.byref(trace)), 0)
+        self.assertEqual(self.c.carillon_close_trace(trace), 0)
+        self.assertEqual(self.c.carillon_render(self.connection, file, None, ctypes.byref(sound)), 3)
+        self.assertRegex(self.c.carillon_error(), b"^TRACE_EMPTY: ")
 
     def test_only_functions_of_the_header_are_exported(self):
         listed = subprocess.run(["nm", "-D", "--defined-only", self.library], check=True, capture_output=True,

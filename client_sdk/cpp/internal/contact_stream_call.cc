@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
@@ -17,6 +18,9 @@
 
 namespace carillon::client {
 namespace {
+
+/// The daemon takes messages of 2 MiB (ServerLimits.message_bytes), with some bytes around a step.
+constexpr size_t kMostStepBytes = (size_t{2} << 20U) - 64;
 
 /// A call of StreamContacts, driven by gRPC's reactor.
 ///
@@ -57,6 +61,13 @@ class ContactStreamCall final
   }
 
   absl::Status Send(v1::ContactStep step) override {
+    if (step.ByteSizeLong() > kMostStepBytes) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "STEP_TOO_LARGE",
+                     absl::StrCat("a step of ", step.ByteSizeLong(),
+                                  " bytes: the daemon takes at "
+                                  "most ",
+                                  kMostStepBytes, "; report fewer points"));
+    }
     absl::MutexLock lock(&mutex_);
     if (!holding_) {
       mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));

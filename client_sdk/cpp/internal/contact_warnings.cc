@@ -10,6 +10,8 @@
 namespace carillon::client {
 namespace {
 
+/// Steps with one time that are no chance.
+constexpr uint64_t kManyStandingSteps = 10;
 /// Time by which a simulation in real time may run ahead.
 constexpr double kUsualLeadS = 0.25;
 
@@ -17,8 +19,7 @@ std::string Were(uint64_t count) {
   return absl::StrCat(count, count == 1 ? " contact was" : " contacts were");
 }
 
-void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
-                 std::vector<std::string>& warnings) {
+void AddStepFindings(const v1::ContactFindings& findings, std::vector<std::string>& warnings) {
   if (findings.regular_gap_s() > 0) {
     warnings.push_back(absl::StrFormat(
         "most steps came %.3g s apart, which is longer than the step_s that was stated, so that a "
@@ -26,6 +27,24 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
         "steps in seconds",
         findings.regular_gap_s()));
   }
+  if (const uint64_t count = findings.standing_step_count(); count >= kManyStandingSteps) {
+    warnings.push_back(
+        absl::StrCat(count,
+                     " steps with contacts had the time of the step before; give each step the "
+                     "simulation's time, in seconds"));
+  }
+  if (const uint64_t count = findings.changed_partner_count(); count > 0) {
+    warnings.push_back(
+        absl::StrCat("in ", count,
+                     " steps an object in contact touched none of its partners of the step "
+                     "before, so that a body at rest strikes in each of them; give a body the "
+                     "same partner in each step, such as the engine's number of that body"));
+  }
+}
+
+void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
+                 std::vector<std::string>& warnings) {
+  AddStepFindings(findings, warnings);
   if (const uint64_t count = findings.fast_impulse_count(); count > 0) {
     warnings.push_back(absl::StrFormat(
         "%d contact%s changed the speed of an object by up to %.3g m/s; give impulses in newton "
@@ -54,7 +73,8 @@ void AddFindings(const v1::ContactFindings& findings, uint64_t accepted_count,
 
 }  // namespace
 
-std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& report) {
+std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& report,
+                                         uint64_t dropped_step_count) {
   std::vector<std::string> warnings;
   if (report.late_count() > 0) {
     warnings.push_back(absl::StrFormat(
@@ -72,6 +92,11 @@ std::vector<std::string> ContactWarnings(const v1::StreamContactsResponse& repor
   if (report.dropped_count() > 0) {
     warnings.push_back(
         absl::StrCat(Were(report.dropped_count()), " lost, because too many waited for the mixer"));
+  }
+  if (dropped_step_count > 0) {
+    warnings.push_back(absl::StrCat(dropped_step_count,
+                                    dropped_step_count == 1 ? " step was" : " steps were",
+                                    " not sent, because too many waited for the network"));
   }
   if (report.rejected_count() > 0) {
     warnings.push_back(absl::StrCat(Were(report.rejected_count()), " rejected, the last one with ",

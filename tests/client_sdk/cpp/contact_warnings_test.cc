@@ -32,15 +32,20 @@ TEST(ContactWarningsTest, EachCountThatMeansAMistakeGivesASentence) {
   report.mutable_last_rejection()->set_reason("POINT_NOT_FINITE");
   report.mutable_last_rejection()->set_message("send metres");
   report.mutable_findings()->set_regular_gap_s(1.0 / 120);
+  report.mutable_findings()->set_standing_step_count(10);
+  report.mutable_findings()->set_changed_partner_count(11);
   report.mutable_findings()->set_fast_impulse_count(2);
   report.mutable_findings()->set_largest_speed_change_m_per_s(480);
   report.mutable_findings()->set_distant_point_count(1);
   report.mutable_findings()->set_largest_distance_m(0.5);
-  EXPECT_THAT(ContactWarnings(report),
+  EXPECT_THAT(ContactWarnings(report, 4),
               ElementsAre(AllOf(StartsWith("1 contact was late"), HasSubstr("it was 0.02 s")),
                           HasSubstr("mapped anew 2 times"), StartsWith("3 contacts were lost"),
+                          StartsWith("4 steps were not sent"),
                           "1 contact was rejected, the last one with POINT_NOT_FINITE: send metres",
                           StartsWith("most steps came 0.00833 s apart"),
+                          StartsWith("10 steps with contacts had the time of the step before"),
+                          StartsWith("in 11 steps an object in contact touched none"),
                           StartsWith("2 contacts changed the speed of an object by up to 480 m/s"),
                           StartsWith("1 contact lies up to 0.5 m away")));
 }

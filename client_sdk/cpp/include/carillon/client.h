@@ -220,8 +220,9 @@ class Client {
   virtual absl::Status Listen(const AudioCallback& on_block) const;
 
   /// Renders the rest of `trace` offline, as fast as the daemon can, and passes the sound to
-  /// `on_block`. Further errors: those of ContactTraceReader::Next; CANCELLED (RENDERING_STOPPED)
-  /// if `on_block` returned false.
+  /// `on_block`. A reader is at its end after a rendering. Further errors: those of
+  /// ContactTraceReader::Next; INVALID_ARGUMENT (TRACE_EMPTY) if nothing of `trace` is left;
+  /// CANCELLED (RENDERING_STOPPED) if `on_block` returned false.
   virtual absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
                                                    ContactTraceReader& trace,
                                                    const AudioCallback& on_block) const;
