@@ -29,7 +29,6 @@
 #include "server/api/client_limits.h"
 #include "server/api/guess_limiter.h"
 #include "server/api/peer_name.h"
-#include "server/api/received_bytes.h"
 
 namespace carillon {
 namespace {
@@ -305,6 +304,17 @@ bool ConnectionGate::IsOpen(const std::string& peer) const {
 
 bool ConnectionGate::Refuse(const std::string& peer) {
   const MutexLock lock(&mutex_);
+  if (!EndLocked(peer)) return false;
+  RefuseSourceLocked(peer);
+  return true;
+}
+
+bool ConnectionGate::End(const std::string& peer) {
+  const MutexLock lock(&mutex_);
+  return EndLocked(peer);
+}
+
+bool ConnectionGate::EndLocked(const std::string& peer) {
   const auto found = connections_.find(peer);
   if (found == connections_.end() || found->second.refused || !found->second.is_open()) {
     return false;
@@ -313,7 +323,6 @@ bool ConnectionGate::Refuse(const std::string& peer) {
   // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   DiscardReceived(found->second.descriptor);
-  RefuseSourceLocked(peer);
   return true;
 }
 
@@ -328,11 +337,11 @@ bool ConnectionGate::RefuseSourceLocked(const std::string& peer) {
   return refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer)).second;
 }
 
-std::optional<uint64_t> ConnectionGate::ReceivedBytes(const std::string& peer) const {
+std::optional<TcpBytes> ConnectionGate::CountBytes(const std::string& peer) const {
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
   if (found == connections_.end() || !found->second.is_open()) return std::nullopt;
-  return carillon::ReceivedBytes(found->second.descriptor);
+  return CountTcpBytes(found->second.descriptor);
 }
 
 std::chrono::seconds ConnectionGate::RefusalTimeOf(const std::string& peer) const {

@@ -18,6 +18,7 @@
 #include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/api/socket_file.h"
+#include "server/api/tcp_bytes.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -91,9 +92,13 @@ class ConnectionGate {
   /// leaves the open ones alone. Returns false if it does so already. Any thread may call it.
   bool RefuseSource(const std::string& peer);
 
-  /// Returns how many bytes have come over the open TCP connection with this name. Returns nothing
-  /// for a Unix socket, of which the system does not count them. Any thread may call it.
-  std::optional<uint64_t> ReceivedBytes(const std::string& peer) const;
+  /// Ends the connection with this name, and leaves others alone. Returns false if the connection
+  /// is not open or is ending already. Any thread may call it.
+  bool End(const std::string& peer);
+
+  /// Returns the bytes of the open TCP connection with this name, or nothing for a Unix socket. Any
+  /// thread may call it.
+  std::optional<TcpBytes> CountBytes(const std::string& peer) const;
 
   /// Returns the time for which Refuse keeps out the process or address of this connection.
   std::chrono::seconds RefusalTimeOf(const std::string& peer) const;
@@ -132,6 +137,7 @@ class ConnectionGate {
   /// Returns why a process or address gets no place, or an empty string if it gets one.
   std::string WhyNoPlace(const std::string& source) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Tell(const std::string& source, const std::string& reason);
+  bool EndLocked(const std::string& peer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Returns false if the source of `peer` is refused already.
   bool RefuseSourceLocked(const std::string& peer) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Logs a line, unless a line about the same `subject` was logged within kRefusal.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/api/grpc_servers.h"
 #include "server/api/server_service.h"
 
 namespace carillon {
@@ -22,9 +23,13 @@ constexpr double kMostLoad = 0.05;
 /// Number of newest connections that are examined each time, in addition to the busy ones.
 constexpr size_t kNewest = 64;
 constexpr size_t kInTurn = 64;
-/// Period after which the bytes that came without progress are forgotten. A client that only
-/// receives sends some bytes for that, too.
-constexpr std::chrono::minutes kForgiving(1);
+/// A connection with fewer open calls is not closed for the calls of its source.
+constexpr uint64_t kFewCalls = 16;
+/// Unfinished messages of open calls take at most gRPC's memory.
+constexpr uint64_t kMostUnfinishedBytes = GrpcServers::kTcpMemoryBytes;
+/// A client answers received bytes with 1/1000 as many or fewer, and sends some pings a minute.
+constexpr uint64_t kReceivedPerSent = 64;
+constexpr double kPingBytesPerSecond = 1024;
 /// Time over which the rate of failed calls is averaged.
 constexpr double kWindowS = 0.5;
 constexpr double kWindowOfSourceS = 1;
@@ -54,6 +59,11 @@ std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now,
   return absl::StrCat("it has begun and cancelled ", failed, " calls within ",
                       std::ceil(10 * seconds) / 10, " s, and at most ", kMaxFailedCallsPerSecond,
                       " a second are allowed");
+}
+
+uint64_t MostIdleBytes(uint64_t open_count, uint64_t acknowledged, double seconds) {
+  return kMostIdleBytes + std::min<uint64_t>(open_count * kMaxMessageBytes, kMostUnfinishedBytes) +
+         acknowledged / kReceivedPerSent + static_cast<uint64_t>(kPingBytesPerSecond * seconds);
 }
 
 FloodGuard::FloodGuard(ConnectionGate& gate, LimitedLog& log)
@@ -118,15 +128,18 @@ std::vector<int64_t> FloodGuard::ChooseConnections() {
 void FloodGuard::CountForSource(Watched& watched, const ConnectionCalls* now) {
   Source& source = sources_[watched.source];
   const ConnectionCalls before = std::exchange(watched.newest, now ? *now : ConnectionCalls());
+  if (now == nullptr) --source.connection_count;
+  if (now != nullptr) watched.busy = now->begun_count != before.begun_count;
+  if (watched.refused) return;
   source.open_count -= before.open_count();
-  if (now == nullptr) {
-    --source.connection_count;
-    source.failed_count += before.open_count();
-    return;
-  }
-  watched.busy = now->begun_count != before.begun_count;
-  source.open_count += now->open_count();
-  source.failed_count += now->failed_count - before.failed_count;
+  source.failed_count +=
+      now == nullptr ? before.open_count() : now->failed_count - before.failed_count;
+  if (now != nullptr) source.open_count += now->open_count();
+}
+
+void FloodGuard::LeaveSource(Watched& watched) {
+  if (std::exchange(watched.refused, true)) return;
+  sources_[watched.source].open_count -= watched.newest.open_count();
 }
 
 std::string FloodGuard::FindFloodOfSource(Source& source, Clock::time_point now) {
@@ -147,24 +160,30 @@ std::string FloodGuard::FindFloodOfSource(Source& source, Clock::time_point now)
 }
 
 std::string FloodGuard::FindIdleBytes(Watched& watched, const ConnectionCalls& calls,
-                                      Clock::time_point now) {
-  const std::optional<uint64_t> received = gate_.ReceivedBytes(watched.peer);
-  if (!received) return "";
-  if (calls.progress() != watched.progress || now - watched.forgiven > kForgiving) {
+                                      const TcpBytes& bytes, Clock::time_point now) {
+  // The counts fall if another connection has got the name of one that has just ended.
+  if (calls.progress() != watched.progress || bytes.received < watched.bytes.received ||
+      bytes.acknowledged < watched.bytes.acknowledged) {
     watched.progress = calls.progress();
-    watched.counted_bytes = *received;
-    watched.forgiven = now;
+    watched.bytes = bytes;
+    watched.progressed = now;
   }
-  const uint64_t idle = *received - watched.counted_bytes;
-  if (idle <= kMostIdleBytes + calls.open_count() * kMaxMessageBytes) return "";
+  const uint64_t idle = bytes.received - watched.bytes.received;
+  const uint64_t acknowledged = bytes.acknowledged - watched.bytes.acknowledged;
+  if (idle <=
+      MostIdleBytes(calls.open_count(), acknowledged, SecondsOf(now - watched.progressed))) {
+    return "";
+  }
   return absl::StrCat("it has sent ", idle >> 20U,
                       " MiB that are neither calls nor whole messages, such as headers without an "
                       "end");
 }
 
 void FloodGuard::LookAt(WatchedById::iterator at, Clock::time_point now) {
-  const std::optional<ConnectionCalls> calls = ReadConnectionCalls(at->first);
   Watched& watched = at->second;
+  // The bytes are read first, because a call or message that comes meanwhile explains them.
+  const std::optional<TcpBytes> bytes = gate_.CountBytes(watched.peer);
+  const std::optional<ConnectionCalls> calls = ReadConnectionCalls(at->first);
   CountForSource(watched, calls ? &*calls : nullptr);
   const auto source = sources_.find(watched.source);
   const std::string flood_of_source = FindFloodOfSource(source->second, now);
@@ -177,10 +196,19 @@ void FloodGuard::LookAt(WatchedById::iterator at, Clock::time_point now) {
     return;
   }
   const double seconds = SecondsOf(now - watched.since);
+  if (bytes) {
+    const std::string idle = FindIdleBytes(watched, *calls, *bytes, now);
+    if (!idle.empty() && gate_.End(watched.peer)) {
+      log_.Warn(absl::StrCat("closed the connection ", watched.peer, ": ", idle));
+    }
+  }
   std::string flood = FindFlood(watched.calls, *calls, seconds);
-  if (flood.empty()) flood = FindIdleBytes(watched, *calls, now);
-  if (flood.empty() && source->second.open_count > kMaxCallsOfSource) flood = flood_of_source;
+  const bool helps = calls->open_count() >= kFewCalls;
+  if (flood.empty() && helps && source->second.open_count > kMaxCallsOfSource) {
+    flood = flood_of_source;
+  }
   if (!flood.empty() && gate_.Refuse(watched.peer)) {
+    LeaveSource(watched);
     log_.Warn(absl::StrCat("closed the connection ", watched.peer, ": ", flood,
                            "; connections from there are refused for ",
                            gate_.RefusalTimeOf(watched.peer).count(), " s"));

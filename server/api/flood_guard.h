@@ -12,6 +12,7 @@
 #include "server/api/connection_calls.h"
 #include "server/api/connection_gate.h"
 #include "server/api/limited_log.h"
+#include "server/api/tcp_bytes.h"
 
 namespace carillon {
 
@@ -30,9 +31,14 @@ inline constexpr uint64_t kMaxCallsOfSource = 16'384;
 /// averaged over a second. Calls fail that are open when their connection ends.
 inline constexpr double kMaxFailedCallsOfSource = 5000;
 
-/// Greatest number of bytes that may come over a TCP connection in a minute without a new call or a
-/// whole message, in addition to a message of the greatest size for each open call.
-inline constexpr uint64_t kMostIdleBytes = uint64_t{4} << 20U;
+/// Greatest number of bytes that may come over a TCP connection without a new call or a whole
+/// message. There may be more for open calls, for what the client receives, and for pings, see
+/// MostIdleBytes.
+inline constexpr uint64_t kMostIdleBytes = uint64_t{16} << 20U;
+
+/// Returns the greatest number of idle bytes if `open_count` calls are open, and if since the last
+/// call or message `acknowledged` bytes went to the client and `seconds` have passed.
+uint64_t MostIdleBytes(uint64_t open_count, uint64_t acknowledged, double seconds);
 
 /// Returns the reason to close a connection with these counts, as a text for an operator, or an
 /// empty string if the connection may stay. `before` was counted `seconds` before `now`.
@@ -63,10 +69,10 @@ class FloodGuard {
     ConnectionCalls calls;     ///< counts at the start of the span over which calls are counted
     Clock::time_point since;   ///< start of that span
     uint64_t progress = 0;     ///< ConnectionCalls::progress() when it changed last
-    /// Bytes that had come when the progress changed last, or when bytes were last forgiven.
-    uint64_t counted_bytes = 0;
-    Clock::time_point forgiven{};
-    bool busy = false;  ///< whether calls had begun between the last two looks
+    TcpBytes bytes{};          ///< counts when the progress changed last
+    Clock::time_point progressed{};  ///< when it changed last
+    bool refused = false;            ///< whether the calls no longer count for the source
+    bool busy = false;               ///< whether calls had begun between the last two looks
   };
   using WatchedById = std::map<int64_t, Watched>;
   /// The calls on all connections of a process or address.
@@ -87,11 +93,14 @@ class FloodGuard {
   /// Counts what has happened on a connection since the last look for its source. `now` is null if
   /// the connection has ended.
   void CountForSource(Watched& watched, const ConnectionCalls* now);
+  /// Lets the calls of a connection that is closed no longer count for its source.
+  void LeaveSource(Watched& watched);
   /// Returns the reason to refuse a source, or an empty string.
   std::string FindFloodOfSource(Source& source, Clock::time_point now);
   /// Returns the reason to close a connection whose client sends bytes that are neither calls nor
   /// whole messages, or an empty string.
-  std::string FindIdleBytes(Watched& watched, const ConnectionCalls& calls, Clock::time_point now);
+  static std::string FindIdleBytes(Watched& watched, const ConnectionCalls& calls,
+                                   const TcpBytes& bytes, Clock::time_point now);
 
   ConnectionGate& gate_;
   LimitedLog& log_;

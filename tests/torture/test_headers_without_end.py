@@ -3,7 +3,6 @@
 
 import contextlib
 import socket
-import time
 import unittest
 
 import torture
@@ -11,8 +10,8 @@ from http2_frames import CONTINUATION, HEADERS, PREFACE, SETTINGS, field, frame
 
 VALUE_BYTES = 7000
 MOST_BYTES = torture.rounds(256, 1024) << 20
-# The daemon allows 4 MiB, and 2 MiB for the call; some are on their way meanwhile.
-CLOSED_BYTES, MOST_MIB = 48 << 20, 64
+# The daemon allows 18 MiB; some are on their way meanwhile, in the buffers of the kernel.
+CLOSED_BYTES, MOST_MIB = 160 << 20, 100
 
 
 class HeadersWithoutEndTest(torture.ServedTest):
@@ -36,7 +35,6 @@ class HeadersWithoutEndTest(torture.ServedTest):
         self.assertLess(most_mib, MOST_MIB)
         torture.wait_until(lambda: "neither calls nor whole messages" in (self.folder / "log").read_text(), 10)
         begun = scene.answer.accepted_count
-        time.sleep(1)
         torture.wait_until(lambda: scene.answer.accepted_count > begun, 10)
 
 

@@ -12,7 +12,7 @@ import torture
 METHODS = [f"/grpc.reflection.{version}.ServerReflection/ServerReflectionInfo" for version in ("v1", "v1alpha")]
 CALLS, CONNECTIONS = 400, 4
 # gRPC begins a few threads under any load.
-MOST_THREADS = 8
+MOST_THREADS = 50
 # A ServerReflectionRequest for the file that contains the symbol (field 4) "carillon".
 REQUEST = b"\x22\x08carillon"
 

@@ -35,6 +35,13 @@ TEST(FindFloodTest, ToleratesCallsThatEndWhileTheyAreCounted) {
   EXPECT_EQ((ConnectionCalls{.begun_count = 7, .answered_count = 8}.open_count()), 0U);
 }
 
+TEST(MostIdleBytesTest, GrowsWithOpenCallsWithWhatWasReceivedAndWithTime) {
+  EXPECT_EQ(MostIdleBytes(0, 0, 0), kMostIdleBytes);
+  EXPECT_EQ(MostIdleBytes(2, 0, 0), kMostIdleBytes + (4U << 20U));
+  EXPECT_EQ(MostIdleBytes(512, 0, 0), kMostIdleBytes + (96U << 20U));
+  EXPECT_EQ(MostIdleBytes(0, 6400, 10), kMostIdleBytes + 100 + 10'240);
+}
+
 using ConnectionCallsTest = ServedDaemon;
 
 TEST_F(ConnectionCallsTest, AreCountedByConnection) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/received_bytes.h"
+#include "server/api/tcp_bytes.h"
 
 // The tcp_info of <netinet/tcp.h> has no tcpi_bytes_received.
 #include <linux/tcp.h>
@@ -8,11 +8,11 @@
 
 namespace carillon {
 
-std::optional<uint64_t> ReceivedBytes(int descriptor) {
+std::optional<TcpBytes> CountTcpBytes(int descriptor) {
   tcp_info info{};
   socklen_t size = sizeof info;
   if (getsockopt(descriptor, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
-  return info.tcpi_bytes_received;
+  return TcpBytes{.received = info.tcpi_bytes_received, .acknowledged = info.tcpi_bytes_acked};
 }
 
 }  // namespace carillon
