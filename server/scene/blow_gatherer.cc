@@ -117,20 +117,29 @@ void BlowGatherer::End(Events& events) {
 }
 
 void BlowGatherer::CountPartners() {
+  std::set<uint32_t> changed;
+  bool stay = false, change_again = false;
   for (auto pair = pairs_.begin(); pair != pairs_.end();) {
     const uint32_t handle = pair->first.first;
     bool touches = false, touched = false, stays = false;
     for (; pair != pairs_.end() && pair->first.first == handle; ++pair) {
-      const bool now = !pair->second.touches.empty();
+      const bool now = std::ranges::any_of(pair->second.touches, [](const PairTouch& touch) {
+        return Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds) > 0;
+      });
       const bool before = pair->second.touched_s && pair->second.touched_s == previous_time_s_;
       touches = touches || now;
       touched = touched || before;
       stays = stays || (now && before);
     }
     if (!touches || !touched) continue;
-    ++stays_in_contact_count_;
-    if (!stays) ++counts_.changed_partner_count;
+    stay = true;
+    if (stays) continue;
+    changed.insert(handle);
+    change_again = change_again || changed_.contains(handle);
   }
+  stays_in_contact_count_ += stay ? 1 : 0;
+  counts_.changed_partner_count += change_again ? 1 : 0;
+  changed_ = std::move(changed);
 }
 
 BlowCounts BlowGatherer::counts() const {

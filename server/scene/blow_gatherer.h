@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -20,8 +21,9 @@ namespace carillon {
 struct BlowCounts {
   uint64_t blow_count = 0;  ///< blows; a blow may span several steps
   uint64_t load_count = 0;  ///< contacts that were only loads, counted in each step
-  /// Steps in which an object in contact touches none of its partners of the step before. Zero
-  /// unless there are at least ten, four fifths of all steps in which an object stays in contact.
+  /// Steps in which an object in contact touches none of its partners of the step before, as in the
+  /// step before, too. Zero unless there are at least ten, four fifths of all steps in which an
+  /// object stays in contact.
   uint64_t changed_partner_count = 0;
 };
 
@@ -130,7 +132,7 @@ class BlowGatherer {
   using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
 
   void End(Events& events);
-  /// Counts the objects that stay in contact in this step, and those that keep no partner.
+  /// Counts this step if objects stay in contact in it, and if some of them keep no partner again.
   void CountPartners();
   /// Ends the forces, and lets `missing_count` steps without contact pass.
   void EndBeforeGap(double missing_count, Events& events);
@@ -160,7 +162,8 @@ class BlowGatherer {
   size_t touch_count_ = 0;               // number of contacts in this step
   bool follows_ = false;                 // whether no step is missing before this step
   BlowCounts counts_;                    // changed_partner_count without its conditions
-  uint64_t stays_in_contact_count_ = 0;  // steps of objects that touched in the step before, too
+  uint64_t stays_in_contact_count_ = 0;  // steps with an object that touched in the step before
+  std::set<uint32_t> changed_;           // objects that kept no partner in the last step
 };
 
 }  // namespace carillon

@@ -56,6 +56,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
   Push(gatherer_.Begin(time_s));
   if (step_count_ > 0) intervals_.Add(time_s - time_s_);
   stands_ = step_count_ > 0 && time_s == time_s_;
+  has_force_ = false;
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -86,7 +87,7 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
 }
 
 void ContactIntake::Hold(std::span<const ObjectForce> forces) {
-  findings_.standing_step_count += std::exchange(stands_, false) ? 1 : 0;
+  NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectForce& force : forces) {
     Note(force.contact, TryHold(force));
@@ -103,7 +104,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
 }
 
 void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
-  findings_.standing_step_count += std::exchange(stands_, false) ? 1 : 0;
+  NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectTouch& touch : touches) {
     Note(touch.contact, TryTouch(touch));
@@ -241,8 +242,19 @@ void ContactIntake::NoteZero(const ObjectContact& contact) {
   if (x == 0 && y == 0 && z == 0) ++findings_.zero_impulse_count;
 }
 
+void ContactIntake::NoteForce() {
+  if (std::exchange(has_force_, true)) return;
+  ++force_step_count_;
+  findings_.standing_step_count += stands_ ? 1 : 0;
+}
+
 IntakeFindings ContactIntake::findings() const {
+  constexpr uint64_t kManyStanding = 10, kStandingPart = 5;
   IntakeFindings findings = findings_;
+  if (findings.standing_step_count < kManyStanding ||
+      kStandingPart * findings.standing_step_count < force_step_count_) {
+    findings.standing_step_count = 0;
+  }
   findings.engine = gatherer_.counts();
   findings.regular_gap_s = intervals_.RegularGapS();
   return findings;

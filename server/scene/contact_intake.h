@@ -71,7 +71,9 @@ struct IntakeFindings {
   double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
   uint64_t fast_impulse_count = 0;       ///< impulses that change a speed by over 100 m/s
   double largest_speed_change_m_per_s = 0;
-  uint64_t standing_step_count = 0;  ///< steps of touches or forces at the time of the step before
+  /// Steps with touches or forces at the time of the step before. Zero unless there are at least
+  /// ten, a fifth of all steps with touches or forces.
+  uint64_t standing_step_count = 0;
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -155,6 +157,8 @@ class ContactIntake {
   /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
   absl::Status Examine(const FeltContact& felt, double seconds);
   void NoteZero(const ObjectContact& contact);
+  /// Counts the step of a touch or a force.
+  void NoteForce();
   void Push(const BlowGatherer::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
@@ -170,8 +174,9 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
-  bool stands_ =
-      false;  // whether this step, of which no force is known yet, has the last one's time
+  bool stands_ = false;     // whether this step has the time of the last one
+  bool has_force_ = false;  // whether this step has a touch or a force
+  uint64_t force_step_count_ = 0;
   StepIntervals intervals_;
   BlowGatherer gatherer_;
   PoseTimes pose_times_;

@@ -10,8 +10,6 @@
 namespace carillon::client {
 namespace {
 
-/// Steps with one time that are no chance.
-constexpr uint64_t kManyStandingSteps = 10;
 /// Time by which a simulation in real time may run ahead.
 constexpr double kUsualLeadS = 0.25;
 
@@ -27,7 +25,7 @@ void AddStepFindings(const v1::ContactFindings& findings, std::vector<std::strin
         "steps in seconds",
         findings.regular_gap_s()));
   }
-  if (const uint64_t count = findings.standing_step_count(); count >= kManyStandingSteps) {
+  if (const uint64_t count = findings.standing_step_count(); count > 0) {
     warnings.push_back(
         absl::StrCat(count,
                      " steps with contacts had the time of the step before; give each step the "

@@ -6,8 +6,6 @@ const { counted } = require('./checks');
 const SCENE_FRAME = "the scene's frame";
 /** Time by which a simulation in real time may run ahead. */
 const USUAL_LEAD_S = 0.25;
-/** Steps with one time that are no chance. */
-const MANY_STANDING_STEPS = 10;
 
 function were(count, noun) {
   return `${counted(count, noun)} ${Number(count) === 1 ? 'was' : 'were'}`;
@@ -57,7 +55,7 @@ function warnOfContacts(findings, frame, acceptedCount = 0) {
       'body at rest strikes in each of them; state the step of the simulator and the times of steps in seconds');
   }
   const standing = Number(findings?.standing_step_count ?? 0);
-  if (standing >= MANY_STANDING_STEPS) {
+  if (standing) {
     warn(`${standing} steps with contacts had the time of the step before; give each step the simulation's time, in ` +
       'seconds');
   }

@@ -63,7 +63,6 @@ test('forces in place of impulses and a simulation ahead of its sound are told',
 });
 
 test('time that stands still and partners that change are told', async () => {
-  assert.deepEqual(await told({ findings: { standing_step_count: 9 } }), []);
   assert.match((await told({ findings: { standing_step_count: 10 } })).join(),
     /^ContactWarning: 10 steps with contacts had the time of the step before; give each step/);
   assert.match((await told({ findings: { changed_partner_count: 11 } })).join(),

@@ -314,20 +314,21 @@ TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {
 TEST_F(ReadingTest, StepsWithTouchesAtTheTimeOfTheStepBeforeAreCounted) {
   ContactIntake intake = Open({});
   ObjectTouch touch{.contact = SmallImpulse(1, 0.1).contact, .partner = 9};
-  // Open has begun a step at zero.
-  for (const double time_s : {0.0, 0.0, kStepS, kStepS}) {
-    ASSERT_TRUE(intake.BeginStep(time_s).ok());
-    intake.Touch(touch);
-    intake.Touch(touch);
+  const auto step = [&](double time_s, bool touches) {
+    EXPECT_TRUE(intake.BeginStep(time_s).ok());
+    if (touches) intake.Touch(touch);
+    if (touches) intake.Touch(touch);
+    if (!touches) intake.Strike(SmallImpulse(1, 0.1));
     intake.EndStep();
-  }
-  EXPECT_EQ(intake.findings().standing_step_count, 3U);
-  for (int i = 0; i < 3; ++i) {
-    ASSERT_TRUE(intake.BeginStep(kStepS).ok());
-    intake.Strike(SmallImpulse(1, 0.1));
-    intake.EndStep();
-  }
-  EXPECT_EQ(intake.findings().standing_step_count, 3U);
+    return intake.findings().standing_step_count;
+  };
+  // Open has begun a step at zero. Ten standing steps count, but no strikes.
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(step(0, true), 0U);
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(step(0, false), 0U);
+  EXPECT_EQ(step(0, true), 10U);
+  // They count as long as they are a fifth of all steps with touches.
+  for (int i = 1; i <= 40; ++i) EXPECT_EQ(step(i * kStepS, true), 10U);
+  EXPECT_EQ(step(41 * kStepS, true), 0U);
 }
 
 TEST_F(ReadingTest, ImpulsesThatAreProbablyForcesAreCounted) {

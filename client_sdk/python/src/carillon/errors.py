@@ -17,8 +17,6 @@ from carillon.v1 import contact_pb2, contact_service_pb2, error_pb2
 SCENE_FRAME = "the scene's frame"
 # Time by which a simulation in real time may run ahead.
 USUAL_LEAD_S = 0.25
-# Steps with one time that are no chance.
-MANY_STANDING_STEPS = 10
 DETAILS_KEY = "grpc-status-details-bin"
 # The caller's names of fields and calls of the contract that messages of the daemon mention.
 CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
@@ -95,7 +93,7 @@ def warn_of_contacts(findings: contact_pb2.ContactFindings, frame: str, accepted
         _warn(f"most steps came {findings.regular_gap_s:.3g} s apart, which is longer than the step that was stated, "
               "so that a body at rest strikes in each of them; state the step of the simulator and the times of steps "
               "in seconds")
-    if (count := findings.standing_step_count) >= MANY_STANDING_STEPS:
+    if count := findings.standing_step_count:
         _warn(f"{count} steps with contacts had the time of the step before; give each step the simulation's time, in "
               "seconds")
     if count := findings.changed_partner_count:
