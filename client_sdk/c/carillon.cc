@@ -110,14 +110,14 @@ absl::StatusOr<carillon_sound> Render(const carillon::client::Client& daemon,
     return true;
   };
   ASSIGN_OR_RETURN(const v1::RenderSummary summary, daemon.Render(settings, trace, take));
-  if (summary.rejected_count() > 0) {
-    return Refusal(absl::StatusCode::kInvalidArgument, summary.last_rejection().reason(),
-                   summary.last_rejection().message());
-  }
   v1::StreamContactsResponse report;
   *report.mutable_findings() = summary.findings();
   report.set_accepted_count(summary.accepted_count());
   KeepWarnings(report, 0);
+  if (summary.rejected_count() > 0) {
+    return Refusal(absl::StatusCode::kInvalidArgument, summary.last_rejection().reason(),
+                   summary.last_rejection().message());
+  }
   auto owned = std::make_unique<float[]>(samples.size());
   std::ranges::copy(samples, owned.get());
   sound.samples = owned.release();

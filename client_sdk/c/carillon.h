@@ -224,8 +224,9 @@ carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
  * counts dropped steps from the beginning. */
 carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* report);
 
-/** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. If
- * `hearing` is null, the trace has no places. */
+/** Begins a contact trace, which is written to a file (.contacts), to be rendered now or later. The
+ * steps of its simulation last `step_s`, from 1e-6 to 1 s. If `hearing` is null, the trace has no
+ * places. */
 carillon_code carillon_create_trace(const char* file, double step_s, carillon_frame frame,
                                     const carillon_hearing* hearing, carillon_trace** trace);
 /** Adds an object, before the first step that names it. `handle` may be null. */

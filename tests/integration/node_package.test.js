@@ -354,6 +354,18 @@ test('a forgotten await and numbers that make no rows are refused', async () => 
   await assert.rejects(async () => other.info(), /has been closed; connect again/);
 }));
 
+test('a stream that is being closed ends though its client is closed', async () => {
+  const own = carillon.connect();
+  const scene = await c.createScene();
+  const bar = await scene.add(model);
+  const stream = new carillon.Scene(own, scene.name).stream({ step: 1 / 60 });
+  await stream.step(0, { impulses: [{ object: bar.handle, ...STRIKE }] });
+  const closed = stream.close();
+  own.close();
+  assert.equal(Number((await closed).step_count), 1);
+  await scene.delete();
+});
+
 test('a recording is taken once, for a time above zero', async () => {
   const record = await c.listen();
   for (const seconds of [NaN, undefined, 0, -1]) {

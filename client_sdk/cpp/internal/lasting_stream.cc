@@ -85,8 +85,10 @@ class LastingStream final : public ContactStream {
     const absl::MutexLock lock(&mutex_);
     if (!status_.ok()) return status_;
     if (stream_ != nullptr) {
-      status_ = stream_->Send(std::move(step));
-      if (!IsLoss(status_)) return status_;
+      // A stream that has ended repeats its error, and a step that is refused ends no stream.
+      const absl::Status sent = stream_->Send(std::move(step));
+      if (!IsLoss(sent)) return sent;
+      status_ = sent;
       Lose();
     }
     ++dropped_step_count_;

@@ -52,7 +52,7 @@ absl::Status FromRpc(const grpc::Status& status, const std::string& server) {
   }
   // gRPC ends a call so if the daemon cannot parse its request.
   if (code == absl::StatusCode::kUnimplemented && status.error_message().empty()) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "REQUEST_MALFORMED",
+    return Refusal(code, "REQUEST_MALFORMED",
                    absl::StrCat("the daemon at ", server,
                                 " cannot parse the request, or does not know the call: give text "
                                 "in UTF-8, and use a daemon that is no older than the client"));

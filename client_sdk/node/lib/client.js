@@ -317,7 +317,7 @@ class Client {
     return `<Client of ${this.server}>`;
   }
 
-  /** Cancels the calls that are open, such as recordings and streams that were not closed, and ends the connection. */
+  /** Cancels streams that were not closed, recordings and renderings, and ends the connection after the other calls. */
   close() {
     this.isClosed = true;
     for (const call of this.openCalls) call.cancel();

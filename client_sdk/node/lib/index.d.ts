@@ -258,7 +258,7 @@ export class ContactStream {
 
 /** What the daemon plays, from the call of Client.listen on. */
 export class Recording {
-  /** Waits until this much was heard, ends the recording, and returns the sound. */
+  /** Waits until this many seconds, above 0, were heard, ends the recording, and returns the sound. Called once. */
   take(seconds: number): Promise<Sound>;
 }
 
@@ -306,7 +306,7 @@ export class Client {
   stopAll(): Promise<number>;
   /** Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". */
   call(service: string, method: string, request: object): Promise<any>;
-  /** Cancels the calls that are open, such as recordings and streams that were not closed, and ends the connection. */
+  /** Cancels streams that were not closed, recordings and renderings, and ends the connection after the other calls. */
   close(): void;
 }
 

@@ -2,7 +2,6 @@
 'use strict';
 
 const util = require('util');
-const { status } = require('@grpc/grpc-js');
 const { counted, refuseUnknown } = require('./checks');
 const { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
@@ -170,13 +169,14 @@ class ContactStream {
     this.error = undefined;
     this.start = start;
     const { client } = scene;
+    this.client = client;
     this.call = client.stub('ContactService').StreamContacts();
     client.openCalls.add(this.call);
     this.ended = new Promise((resolve) => {
       this.call.on('data', (answer) => { this.report = answer; });
       this.call.on('error', (error) => {
         this.error = fromCall(error, client.server);
-        if (error.code === status.CANCELLED && !this.isClosing) warnOfOpenStream(start.scene);
+        if (client.isClosed && !this.isClosing) warnOfOpenStream(start.scene);
       });
       this.call.on('close', () => {
         client.openCalls.delete(this.call);
@@ -254,6 +254,7 @@ class ContactStream {
   /** Waits until the daemon has taken all steps, and warns unless `warn` is false. Returns the last report. */
   async close(warn = true) {
     this.isClosing = true;
+    this.client.openCalls.delete(this.call); // It ends by itself, also after the client's close().
     this.write();
     await this.ended;
     if (this.error) throw this.error;
