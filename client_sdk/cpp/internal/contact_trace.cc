@@ -122,6 +122,14 @@ absl::StatusOr<std::optional<v1::ContactTraceRecord>> ContactTraceReader::Next()
   return record;
 }
 
+absl::Status ContactTraceReader::NothingLeft() const {
+  return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
+                 absl::StrCat(path_,
+                              ": holds nothing more to render: open the trace anew for each "
+                              "rendering, and record a simulation in which something is "
+                              "struck"));
+}
+
 absl::Status ContactTraceReader::Malformed(absl::string_view what) const {
   return Refusal(
       absl::StatusCode::kInvalidArgument, "TRACE_MALFORMED",

@@ -62,13 +62,6 @@ class BlockReader {
 
 using RenderCall = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
 
-absl::Status TraceEnded() {
-  return Refusal(
-      absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
-      "the trace has nothing left to render: open it anew for each rendering, and record "
-      "a simulation in which something is struck");
-}
-
 /// Sends the settings and the trace. An error of the trace cancels the call.
 absl::Status SendTrace(const v1::RenderSettings& settings, ContactTraceReader& trace,
                        grpc::ClientContext& context, RenderCall& call) {
@@ -79,7 +72,7 @@ absl::Status SendTrace(const v1::RenderSettings& settings, ContactTraceReader& t
   sent = sent && call.Write(request);
   for (bool first = true; sent; first = false) {
     absl::StatusOr<std::optional<v1::ContactTraceRecord>> record = trace.Next();
-    if (record.ok() && !*record && first) record = TraceEnded();
+    if (record.ok() && !*record && first) record = trace.NothingLeft();
     if (!record.ok()) {
       context.TryCancel();
       return record.status();

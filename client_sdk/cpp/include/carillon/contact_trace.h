@@ -57,6 +57,9 @@ class ContactTraceReader {
   /// (TRACE_MALFORMED) if the next bytes are not a whole record.
   absl::StatusOr<std::optional<v1::ContactTraceRecord>> Next();
 
+  /// Returns the error for a caller who needs a further record: INVALID_ARGUMENT (TRACE_EMPTY).
+  absl::Status NothingLeft() const;
+
  private:
   ContactTraceReader(std::string path, std::ifstream file);
   absl::Status Malformed(absl::string_view what) const;
