@@ -86,9 +86,9 @@ class LastingStream final : public ContactStream {
     if (!status_.ok()) return status_;
     if (stream_ != nullptr) {
       // A stream that has ended repeats its error, and a step that is refused ends no stream.
-      const absl::Status sent = stream_->Send(std::move(step));
+      absl::Status sent = stream_->Send(std::move(step));
       if (!IsLoss(sent)) return sent;
-      status_ = sent;
+      status_ = std::move(sent);
       Lose();
     }
     ++dropped_step_count_;
