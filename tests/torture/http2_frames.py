@@ -2,11 +2,13 @@
 """Frames of HTTP/2 (RFC 9113) and fields of HPACK (RFC 7541), byte by byte, for clients that no library would be."""
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
-HEADERS, SETTINGS, CONTINUATION = 1, 4, 9
+HEADERS, RST_STREAM, SETTINGS, PING, CONTINUATION = 1, 3, 4, 6, 9
 END_HEADERS = 4
+CANCEL = 8
+METHOD = b"/carillon.v1.AudioService/GetMixer"
 
 
-def frame(kind, stream, payload, flags=0):
+def frame(kind, flags=0, stream=0, payload=b""):
     return len(payload).to_bytes(3, "big") + bytes((kind, flags)) + stream.to_bytes(4, "big") + payload
 
 
@@ -22,5 +24,11 @@ def length(number):
 
 
 def field(name, value):
-    """A header that is written out and not indexed."""
+    """A header without compression, which is not remembered (RFC 7541, 6.2.2)."""
     return b"\0" + length(len(name)) + name + length(len(value)) + value
+
+
+# The headers of a call.
+CALL = b"".join(field(name, value) for name, value in (
+    (b":method", b"POST"), (b":scheme", b"http"), (b":path", METHOD), (b":authority", b"localhost"),
+    (b"te", b"trailers"), (b"content-type", b"application/grpc")))

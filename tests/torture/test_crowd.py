@@ -21,7 +21,8 @@ import meshes
 import torture
 from carillon.v1 import audio_service_pb2, material_pb2, scene_service_pb2
 from certificates import self_signed
-from test_rapid_reset import METHOD, Flood, resets
+from http2_frames import METHOD
+from test_rapid_reset import Flood, resets
 
 CROWD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"], "tests", "crowd")
 GOOD, SCENES = torture.rounds(40, 1000), torture.rounds(20, 500)

@@ -22,10 +22,10 @@ class HeadersWithoutEndTest(torture.ServedTest):
         torture.wait_until(lambda: scene.answer.accepted_count > 0, 30)
         before = torture.resident_mib(self.daemon.process)
         port = int(self.daemon.listening[-1].rpartition(":")[2])
-        more = frame(CONTINUATION, 1, field(b"x-more", bytes(VALUE_BYTES)))
+        more = frame(CONTINUATION, 0, 1, field(b"x-more", bytes(VALUE_BYTES)))
         sent, most_mib = 0, 0.0
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port)) as connection:
-            connection.sendall(PREFACE + frame(SETTINGS, 0, b"") + frame(HEADERS, 1, field(b":method", b"POST")))
+            connection.sendall(PREFACE + frame(SETTINGS) + frame(HEADERS, 0, 1, field(b":method", b"POST")))
             while sent < MOST_BYTES:
                 connection.sendall(more * 16)
                 sent += 16 * len(more)

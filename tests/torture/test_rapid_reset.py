@@ -16,6 +16,7 @@ import grpc
 
 import torture
 from carillon.v1 import audio_service_pb2
+from http2_frames import CALL, CANCEL, END_HEADERS, HEADERS, METHOD, PING, PREFACE, RST_STREAM, SETTINGS, frame
 
 CONNECTIONS = 4
 RUN_S = torture.rounds(2.0, 20.0)
@@ -27,27 +28,8 @@ LEFT_MIB = 16
 # The daemon gives freed memory back every 5 s; some of it is in use until the connections have ended.
 REST_S = 60
 
-PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
-HEADERS, RST_STREAM, SETTINGS, PING = 1, 3, 4, 6
-END_STREAM, END_HEADERS = 1, 4
-CANCEL = 8
 MOST_STREAM_ID = 2**31 - 1
 FRAMES_AT_ONCE = 200
-METHOD = b"/carillon.v1.AudioService/GetMixer"
-
-
-def frame(kind, flags=0, stream=0, payload=b""):
-    return struct.pack(">I", len(payload))[1:] + struct.pack(">BBI", kind, flags, stream) + payload
-
-
-def literal(name, value):
-    """A header without compression, which is not remembered (RFC 7541, 6.2.2)."""
-    return b"\0" + bytes([len(name)]) + name + bytes([len(value)]) + value
-
-
-CALL = b"".join(literal(name, value) for name, value in (
-    (b":method", b"POST"), (b":scheme", b"http"), (b":path", METHOD), (b":authority", b"localhost"),
-    (b"te", b"trailers"), (b"content-type", b"application/grpc")))
 
 
 def resets(stream):
