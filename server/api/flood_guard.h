@@ -90,7 +90,7 @@ class FloodGuard {
   void WatchNewConnections(Clock::time_point now);
   std::vector<int64_t> ChooseConnections();
   void LookAt(WatchedById::iterator at, Clock::time_point now);
-  /// Counts what has happened on a connection since the last look for its source. `now` is null if
+  /// Adds the calls of a connection since the last look to those of its source. `now` is null if
   /// the connection has ended.
   void CountForSource(Watched& watched, const ConnectionCalls* now);
   /// Lets the calls of a connection that is closed no longer count for its source.

@@ -134,7 +134,6 @@ class ReflectionCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, Re
       return Refusal(absl::StatusCode::kInvalidArgument, "REQUEST_MALFORMED",
                      "a request for reflection must be a ServerReflectionRequest of at most 4 KiB");
     }
-    response_.Clear();
     response_.set_valid_host(request.host());
     Fill(request);
     *response_.mutable_original_request() = std::move(request);

@@ -12,13 +12,13 @@
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
 #include "server/api/resource_name.h"
+#include "server/scene/contact_stream.h"
 #include "server/scene/scene_registry.h"
 
 namespace carillon {
 namespace {
 
 constexpr uint32_t kFormatVersion = 1;
-constexpr double kShortestStepS = 1e-6;
 constexpr uint64_t kMostFirstFrame = uint64_t{1} << 48;
 
 absl::Status Malformed(absl::string_view message) {
@@ -73,7 +73,7 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
                                   "; this daemon reads ", kFormatVersion));
   }
   if (header.step_s() != 0) settings_->step_s = header.step_s();
-  if (!(settings_->step_s >= kShortestStepS && settings_->step_s <= 1)) {
+  if (!IsStepLength(settings_->step_s)) {
     return Malformed(absl::StrCat("the header's step_s is ", header.step_s(),
                                   "; say the simulator's step, from 1e-6 to 1 s"));
   }

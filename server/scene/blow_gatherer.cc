@@ -19,7 +19,8 @@ constexpr double kLongestBlowS = 0.04;
 constexpr double kLoadS = 0.01;
 /// Blows that are farther apart than this are heard one by one, not as a tone.
 constexpr double kLastingS = 0.1;
-/// So many steps without a common partner, and this share of the steps in contact, are a mistake.
+/// A client has made a mistake if kManyChanges steps have no common partner, and if these steps are
+/// the share kMostChanges of the steps in contact.
 constexpr uint64_t kManyChanges = 10;
 constexpr double kMostChanges = 0.8;
 

@@ -10,7 +10,6 @@
 namespace carillon {
 namespace {
 
-constexpr double kShortestStepS = 1e-6;
 constexpr double kNetworkJitterS = 0.005;
 constexpr double kLongestDelayS = 10;
 /// Greatest number of events that wait for the mixer, which takes them at each block.
@@ -21,7 +20,7 @@ absl::Status InvalidStream(absl::string_view message) {
 }
 
 absl::StatusOr<double> SchedulingDelay(const ContactStreamSettings& settings, const Mixer& mixer) {
-  if (!(settings.step_s >= kShortestStepS && settings.step_s <= 1)) {
+  if (!IsStepLength(settings.step_s)) {
     return InvalidStream(absl::StrCat("step_s is ", settings.step_s,
                                       "; say the simulator's step, from 1e-6 to 1 s"));
   }

@@ -13,6 +13,9 @@
 
 namespace carillon {
 
+/// Returns whether a simulator may have steps of this length, 1e-6 to 1 s.
+inline bool IsStepLength(double step_s) { return step_s >= 1e-6 && step_s <= 1; }
+
 /// Settings by which a contact stream maps simulation time to audio time.
 struct ContactStreamSettings {
   double step_s = 0;  ///< the simulator's step, from 1e-6 to 1

@@ -26,11 +26,16 @@ class Reflected {
       : stub_(reflection::ServerReflection::NewStub(channel)),
         stream_(stub_->ServerReflectionInfo(&context_)) {}
 
+  /// Returns false if the call has ended instead of an answer.
+  bool TryAsk(const reflection::ServerReflectionRequest& request,
+              reflection::ServerReflectionResponse& response) {
+    return stream_->Write(request) && stream_->Read(&response);
+  }
+
   /// Returns the answer to a request.
   reflection::ServerReflectionResponse Ask(const reflection::ServerReflectionRequest& request) {
     reflection::ServerReflectionResponse response;
-    EXPECT_TRUE(stream_->Write(request));
-    EXPECT_TRUE(stream_->Read(&response));
+    EXPECT_TRUE(TryAsk(request, response));
     EXPECT_EQ(response.original_request().SerializeAsString(), request.SerializeAsString());
     return response;
   }
@@ -87,16 +92,14 @@ TEST_F(ReflectionTest, HasTheFileOfEveryServiceThatItLists) {
 }
 
 TEST_F(ReflectionTest, EndsACallThatAsksWithoutEnd) {
-  grpc::ClientContext context;
-  const auto stub = reflection::ServerReflection::NewStub(channel());
-  const auto stream = stub->ServerReflectionInfo(&context);
+  Reflected reflected(channel());
   reflection::ServerReflectionRequest request;
   request.set_list_services("");
   reflection::ServerReflectionResponse response;
   int count = 0;
-  while (stream->Write(request) && stream->Read(&response)) ++count;
+  while (reflected.TryAsk(request, response)) ++count;
   EXPECT_EQ(count, 1000);
-  ExpectRefused(stream->Finish(), grpc::StatusCode::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
+  ExpectRefused(reflected.End(), grpc::StatusCode::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
 }
 
 TEST_F(ReflectionTest, SendsEachFileWithAllThatItImports) {
@@ -146,15 +149,12 @@ TEST_F(ReflectionTest, SaysWhatIsNotThere) {
 }
 
 TEST_F(ReflectionTest, RefusesALargeRequest) {
-  grpc::ClientContext context;
-  const auto stub = reflection::ServerReflection::NewStub(channel());
-  const auto stream = stub->ServerReflectionInfo(&context);
+  Reflected reflected(channel());
   reflection::ServerReflectionRequest request;
   request.set_file_containing_symbol(std::string(8192, 'x'));
-  stream->Write(request);
   reflection::ServerReflectionResponse response;
-  EXPECT_FALSE(stream->Read(&response));
-  ExpectRefused(stream->Finish(), grpc::StatusCode::INVALID_ARGUMENT, "REQUEST_MALFORMED");
+  EXPECT_FALSE(reflected.TryAsk(request, response));
+  ExpectRefused(reflected.End(), grpc::StatusCode::INVALID_ARGUMENT, "REQUEST_MALFORMED");
 }
 
 }  // namespace
