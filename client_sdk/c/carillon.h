@@ -166,9 +166,9 @@ const char* carillon_version(void);
 const char* carillon_error(void);
 /** Returns the reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
 const char* carillon_error_reason(void);
-/** Returns what was probably wrong with the contacts of the stream that this thread has closed
- * last, or of the trace that it has rendered last: a sentence in each line, such as that points lie
- * far from their objects. Returns an empty text if nothing was found. The text is valid until this
+/** Returns the probable mistakes in the contacts of the stream that this thread has closed last, or
+ * of the trace that it has rendered last. Each line is a sentence, for example about points that
+ * lie far from their objects. Without a mistake the text is empty. The text is valid until this
  * thread closes a stream or renders again. */
 const char* carillon_warnings(void);
 
