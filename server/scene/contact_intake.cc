@@ -71,18 +71,41 @@ void ContactIntake::Strike(std::span<const ObjectImpulse> impulses) {
 
 absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   ASSIGN_OR_RETURN(const double frame, FrameOfImpulse(impulse.time_offset_s));
+  // In the scene's frame, a vector would have to be turned into the object's before it is added.
+  const bool may_add = !settings_.reading.scene_frame;
+  if (StepImpulses::Struck* struck = may_add ? struck_.Find(impulse) : nullptr) {
+    return TryAdd(impulse, *struck);
+  }
   FeltContact felt;
   RETURN_IF_ERROR(Locate(impulse.contact, 1, felt));
   NoteZero(impulse.contact);
   impulse_count_ += felt.count;
+  if (struck_.full()) PushStruck();
   for (size_t i = 0; i < felt.count; ++i) {
     BlowRecord blow;
     blow.handle = felt.by[i].handle;
     blow.by_sounds = felt.count == felt.by.size();
     if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
     AddBlow(felt.by[i].event, blow, frame);
-    Push(felt.by[i].event, frame);
+    struck_.Append(impulse, felt.by[i], frame);
   }
+  return absl::OkStatus();
+}
+
+absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::Struck& struck) {
+  const Vector3& added = impulse.contact.impulse.impulse_newton_seconds;
+  RETURN_IF_ERROR(Validate(impulse.contact.impulse));
+  RETURN_IF_ERROR(Examine(std::span(&struck.felt, 1), added, 1));
+  NoteZero(impulse.contact);
+  ++impulse_count_;
+  MixerEvent alone = struck.felt.event;
+  std::ranges::transform(added,
+                         std::get<SurfaceImpulse>(alone.action).impulse_newton_seconds.begin(),
+                         [](double x) { return static_cast<float>(x); });
+  BlowRecord blow;
+  blow.handle = struck.felt.handle;
+  AddBlow(alone, blow, struck.frame);
+  struck.Add(added);
   return absl::OkStatus();
 }
 
@@ -161,9 +184,15 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
   return absl::OkStatus();
 }
 
-void ContactIntake::EndStep() { Push(gatherer_.End()); }
+void ContactIntake::EndStep() {
+  PushStruck();
+  Push(gatherer_.End());
+}
 
-void ContactIntake::Finish() { Push(gatherer_.Finish()); }
+void ContactIntake::Finish() {
+  PushStruck();
+  Push(gatherer_.Finish());
+}
 
 void ContactIntake::Reject(uint64_t count, absl::Status reason) {
   rejected_count_ += count;
@@ -198,20 +227,21 @@ absl::Status ContactIntake::Locate(const ObjectContact& contact, double seconds,
       impulse.pulse = Pulse::Gaussian(impulse.pulse.duration_s());
     }
   }
-  return Examine(felt, seconds);
+  return Examine(felt.all(), contact.impulse.impulse_newton_seconds, seconds);
 }
 
-absl::Status ContactIntake::Examine(const FeltContact& felt, double seconds) {
+absl::Status ContactIntake::Examine(std::span<const Felt> felt, const Vector3& vector,
+                                    double seconds) {
   constexpr double kDistantShare = 0.05;
-  const auto& [x, y, z] = felt.by[0].impulse().impulse_newton_seconds;
+  const auto& [x, y, z] = vector;
   // No less than the length, and far quicker.
-  const double bound = (std::abs(double{x}) + std::abs(double{y}) + std::abs(double{z})) * seconds;
-  for (const Felt& one : felt.all()) {
+  const double bound = (std::abs(x) + std::abs(y) + std::abs(z)) * seconds;
+  for (const Felt& one : felt) {
     findings_.largest_distance_m = std::max(findings_.largest_distance_m, one.distance_m);
     if (one.distance_m > kDistantShare * one.extent_m) ++findings_.distant_point_count;
     const double noted_speed = std::min(kFastSpeed, findings_.largest_speed_change_m_per_s);
     if (bound <= noted_speed * one.mass_kg) continue;
-    const double impulse = std::hypot(double{x}, double{y}, double{z}) * seconds;
+    const double impulse = std::hypot(x, y, z) * seconds;
     if (impulse <= one.largest_newton_seconds) {
       NoteSpeedChange(impulse / one.mass_kg);
       continue;
@@ -258,6 +288,11 @@ IntakeFindings ContactIntake::findings() const {
   findings.engine = gatherer_.counts();
   findings.regular_gap_s = intervals_.RegularGapS();
   return findings;
+}
+
+void ContactIntake::PushStruck() {
+  for (StepImpulses::Struck& struck : struck_.events()) Push(struck.felt.event, struck.frame);
+  struck_.Clear();
 }
 
 void ContactIntake::Push(const BlowGatherer::Events& events) {

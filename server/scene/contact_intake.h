@@ -16,6 +16,7 @@
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
+#include "server/scene/step_impulses.h"
 #include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
@@ -141,6 +142,9 @@ class ContactIntake {
  private:
   absl::Status TryStrike(const ObjectImpulse& impulse)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  /// Adds an impulse to one of its step that struck the same point at the same time.
+  absl::Status TryAdd(const ObjectImpulse& impulse, StepImpulses::Struck& struck)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::Status TryHold(const ObjectForce& force) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::Status TryTouch(const ObjectTouch& touch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::Status TryMove(uint32_t handle, const Pose& pose);
@@ -154,11 +158,14 @@ class ContactIntake {
   absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   void NoteSpeedChange(double speed_m_per_s);
-  /// Counts unusual properties of a contact. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
-  absl::Status Examine(const FeltContact& felt, double seconds);
+  /// Counts unusual properties of a contact. `vector` is its impulse, or a force that lasts for
+  /// `seconds`. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
+  absl::Status Examine(std::span<const Felt> felt, const Vector3& vector, double seconds);
   void NoteZero(const ObjectContact& contact);
   /// Counts the step of a touch or a force.
   void NoteForce();
+  /// Hands on the impulses of the step so far.
+  void PushStruck();
   void Push(const BlowGatherer::Events& events);
   void Push(MixerEvent& event, double frame);
   /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
@@ -178,6 +185,7 @@ class ContactIntake {
   bool has_force_ = false;  // whether this step has a touch or a force
   uint64_t force_step_count_ = 0;
   StepIntervals intervals_;
+  StepImpulses struck_;
   BlowGatherer gatherer_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;

@@ -146,14 +146,14 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   const bool known = slot != nullptr && !slot->fading;
   const bool shed_early = known && IsShedEarly(event, *slot);
   if (!known || (!shed_early && !Await(event, *slot))) {
-    Count(queue.dropped_count);
-    return Count(statistics_.dropped_count);
+    Count(queue.dropped_count, event.ReportCount());
+    return Count(statistics_.dropped_count, event.ReportCount());
   }
-  Count(statistics_.shed_count, shed_early ? 1 : 0);
+  Count(statistics_.shed_count, shed_early ? event.ReportCount() : 0);
   if (event.impulse() == nullptr) return;
   const bool counts_as_late = late && queue.timely;
-  Count(counts_as_late ? queue.late_count : queue.accepted_count);
-  Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count);
+  Count(counts_as_late ? queue.late_count : queue.accepted_count, event.ReportCount());
+  Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count, event.ReportCount());
 }
 
 /// Keeps an event until its block, and the start of its contact if the bank sounds from then on.
@@ -173,6 +173,7 @@ bool Mixer::Await(MixerEvent& event, BankSlot& slot) noexcept {
   if (!(lead > 0)) return true;
   MixerEvent begin = event;
   begin.action = ContactBegin{*impulse};
+  begin.added_count = 0;
   begin.SetTime(std::max(event.Time() - lead, now));
   // The impulse sounds without its beginning if there is no place for that.
   if (!push(begin)) Count(statistics_.dropped_count);
@@ -236,7 +237,7 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
     const uint32_t arrival = next_arrival++;
     BankSlot* slot = FindSlot(event.bank);
     if (slot == nullptr) {
-      Count(statistics_.dropped_count);
+      Count(statistics_.dropped_count, event.ReportCount());
       continue;
     }
     --slot->pending_count;
@@ -248,11 +249,11 @@ void Mixer::ChooseEvents(uint32_t block, std::span<const uint32_t> due) noexcept
       treatment = triage_.Treat(LoudnessOf(*impulse, *slot));
     }
     if (treatment == Treatment::kShed) {
-      Count(statistics_.shed_count, strikes ? 1 : 0);
+      Count(statistics_.shed_count, strikes ? event.ReportCount() : 0);
       continue;
     }
     const bool merged = strikes && treatment == Treatment::kMerged;
-    Count(statistics_.merged_count, merged ? 1 : 0);
+    Count(statistics_.merged_count, merged ? event.ReportCount() : 0);
     due_order_.push_back(RenderOrder({.section = slot->section,
                                       .block = block,
                                       .slot = event.bank.slot,

@@ -93,7 +93,9 @@ void RenderSection::Execute(std::span<const DueEvent> events, SectionCounts& cou
     }
     if (slot.voice != nullptr) mix_.SetApart(settings_.block_frame_count);
     const bool applied = !slot.fading && Apply(slot, due);
-    if (!applied) counts.dropped_count += count;
+    for (const DueEvent& lost : applied ? due.first(0) : due) {
+      counts.dropped_count += lost.event->ReportCount();
+    }
     if (applied && !slot.sounding && CanAwaken(*due.front().event)) {
       slot.sounding = true;
       sounding_.push_back(index);

@@ -39,7 +39,9 @@ class EventStream {
   /// dropped.
   bool TryPush(const MixerEvent& event) noexcept {
     const bool pushed = queue_->events.TryPush(event);
-    if (!pushed) queue_->dropped_count.fetch_add(1, std::memory_order_relaxed);
+    if (!pushed) {
+      queue_->dropped_count.fetch_add(event.ReportCount(), std::memory_order_relaxed);
+    }
     return pushed;
   }
 

@@ -84,6 +84,7 @@ struct MixerEvent {
   uint64_t frame = 0;
   float fraction = 0;  ///< 0 <= fraction < 1
   Action action{};
+  uint32_t added_count = 0;  ///< further impulses whose sum with the first one is the impulse
 
   /// The event's time in frames.
   double Time() const noexcept { return static_cast<double>(frame) + double{fraction}; }
@@ -102,6 +103,9 @@ struct MixerEvent {
   /// Frames from the event to its first audible sample.
   float LeadFrames() const noexcept { return fraction > 0 ? 1 - fraction : 0; }
 
+  /// Number of reports of a client whose effect the event has.
+  uint64_t ReportCount() const noexcept { return uint64_t{1} + added_count; }
+
   /// Returns the impulse, or null for another kind of event.
   const SurfaceImpulse* impulse() const noexcept { return std::get_if<SurfaceImpulse>(&action); }
 
@@ -112,8 +116,8 @@ struct MixerEvent {
   }
 };
 
-// Queues between threads copy events bytewise; each event fills one cache line.
+// Queues between threads copy events bytewise.
 static_assert(std::is_trivially_copyable_v<MixerEvent>);
-static_assert(sizeof(MixerEvent) == 64);
+static_assert(sizeof(MixerEvent) == 72);
 
 }  // namespace carillon

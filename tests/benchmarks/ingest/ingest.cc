@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Sends impulses to a scene as fast as the daemon takes them, or at a rate, and prints the counts.
-// Usage: ingest SERVER SCENE rows|columns IMPULSES_A_MESSAGE SECONDS DELAY_S MESSAGES_A_SECOND
+// Usage: ingest SERVER SCENE FORM IMPULSES_A_MESSAGE SECONDS DELAY_S MESSAGES_A_SECOND
 // The scene's objects have the handles 1 to 16. Zero messages a second: as fast as possible.
+// The forms "rows" and "columns" strike each object at one point, and the form "spread" sends
+// columns that strike a new point with each impulse.
 
 #include <carillon/client.h>
 #include <sys/resource.h>
@@ -29,15 +31,20 @@ constexpr size_t kMostWaiting = 256;
 
 struct Options {
   bool columns = false;
+  bool spread = false;
   uint32_t impulse_count = 1;
   double seconds = 1;
   double messages_per_second = 0;
 };
 
-void AddColumns(uint32_t count, carillon::v1::ImpulseColumns& columns) {
-  for (uint32_t i = 0; i < count; ++i) {
+void AddColumns(const Options& options, carillon::v1::ImpulseColumns& columns) {
+  std::array<float, 3> point_m = kPointM;
+  for (uint32_t i = 0; i < options.impulse_count; ++i) {
+    if (options.spread) {
+      point_m[1] = kPointM[1] * static_cast<float>(i) / static_cast<float>(options.impulse_count);
+    }
     columns.add_object(1 + i % kObjectCount);
-    columns.mutable_point_m()->Add(kPointM.begin(), kPointM.end());
+    columns.mutable_point_m()->Add(point_m.begin(), point_m.end());
     columns.mutable_impulse_newton_seconds()->Add(kImpulseNewtonSeconds.begin(),
                                                   kImpulseNewtonSeconds.end());
     columns.add_duration_s(kDurationS);
@@ -56,7 +63,7 @@ void AddRow(uint32_t i, carillon::v1::ContactStep& step) {
 carillon::v1::ContactStep MakeStep(double time_s, const Options& options) {
   carillon::v1::ContactStep step;
   step.set_time_s(time_s);
-  if (options.columns) AddColumns(options.impulse_count, *step.mutable_columns());
+  if (options.columns) AddColumns(options, *step.mutable_columns());
   for (uint32_t i = 0; !options.columns && i < options.impulse_count; ++i) AddRow(i, step);
   return step;
 }
@@ -119,7 +126,8 @@ int main(int argc, char** argv) {
   start.set_step_s(1e-3);
   start.set_scheduling_delay_s(std::atof(argv[6]));
   Options options;
-  options.columns = argv[3] == std::string("columns");
+  options.spread = argv[3] == std::string("spread");
+  options.columns = options.spread || argv[3] == std::string("columns");
   options.impulse_count = static_cast<uint32_t>(std::atoi(argv[4]));
   options.seconds = std::atof(argv[5]);
   options.messages_per_second = std::atof(argv[7]);

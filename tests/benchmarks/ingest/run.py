@@ -3,7 +3,9 @@
 """Impulses a second from each client into a playing scene, and the latency of steps on their way.
 
 Every impulse must be accounted for: applied in time, or applied and then merged or left out by the mixer, which counts
-both. The scheduling delay is long enough for what waits in a client.
+both. The scheduling delay is long enough for what waits in a client, and short enough that the mixer has places for what
+waits there. In rows and columns each object is struck at one point, so that the impulses of a message become one event
+for each object; in "spread" columns each impulse has a point, and an event, of its own.
 """
 
 import argparse
@@ -17,7 +19,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).parent
-DELAY_S = 1
+DELAY_S = 0.1
 OBJECT_COUNT = 16
 LATENCY_DELAYS_S = (0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.050, 0.1)
 
@@ -101,7 +103,7 @@ def main():
                 print("| --- " * 10 + "|")
                 for language in options.languages:
                     for place, server in places.items():
-                        for form in ("rows", "columns"):
+                        for form in ("rows", "columns", *(("spread",) if language == "C++" else ())):
                             for size in options.sizes:
                                 bench.throughput(language, place, server, form, size, options.seconds)
                 for place, server in places.items():

@@ -13,6 +13,7 @@
 
 #include "server/scene/offline_renderer.h"
 #include "server/scene/scene_registry.h"
+#include "tests/server/scene/recording_target.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
@@ -165,16 +166,6 @@ TEST(ContactIntake, LiveAndOfflineGiveTheSameVerdictsForTheSameReasons) {
   EXPECT_EQ(renderer->summary().last_rejection.code(), stream->last_rejection().code());
 }
 
-/// Keeps the events that an intake hands on.
-class RecordingTarget final : public EventTarget {
- public:
-  uint64_t frame() const override { return now; }
-  void Push(const MixerEvent& event) override { events.push_back(event); }
-
-  uint64_t now = 0;
-  std::vector<MixerEvent> events;
-};
-
 TEST(ContactIntake, CountsTheImpulsesThatItHandsOn) {
   Mixer mixer;
   SceneRegistry scenes(mixer);
@@ -268,12 +259,14 @@ TEST_F(ReadingTest, PointsAndImpulsesOfTheScenesFrameAreTurnedIntoTheObjects) {
   impulse.contact.impulse.impulse_newton_seconds = {1, 2, 3};
   impulse.contact.second = {.handle = 2, .location = Point{0, 0.01, 0.05}};
   own.Strike(impulse);
+  own.EndStep();
   const SurfaceImpulse first = Newest(1), second = Newest();
   impulse.contact.impulse.location = Point{5 - 0.03, 6 + 0.02, 7};
   impulse.contact.impulse.impulse_newton_seconds = {-2, 1, 3};
   impulse.contact.second->location = Point{4, 6 - 0.05, 7 + 0.01};
   impulse.contact.second->rotation = Quaternion{};  // ignored
   shared.Strike(impulse);
+  shared.EndStep();
   ASSERT_EQ(target_.events.size(), 4U);
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(Newest(1).at.weights[i], first.at.weights[i], 1e-6);
@@ -288,19 +281,23 @@ TEST_F(ReadingTest, AContactWithoutADurationIsElasticAndHasTheStreamsPulse) {
   ObjectImpulse impulse = SmallImpulse(1, 0.02);
   impulse.contact.impulse.duration_s = std::nullopt;
   cosine.Strike(impulse);
+  cosine.EndStep();
   const Pulse hard = Newest().pulse;
   EXPECT_FALSE(hard.gaussian());
   EXPECT_GT(hard.duration_s(), 3e-5);
   EXPECT_LT(hard.duration_s(), 3e-4);
   gaussian.Strike(impulse);
+  gaussian.EndStep();
   EXPECT_EQ(Newest().pulse, Pulse::Gaussian(hard.duration_s()));
   impulse.contact.impulse.hertz.striker_young_pa = 4e6;
   cosine.Strike(impulse);
+  cosine.EndStep();
   EXPECT_GT(Newest().pulse.duration_s(), 10 * hard.duration_s());
   // A second object strikes with all of its 0.45 kg.
   impulse.contact.impulse.hertz = {};
   impulse.contact.second = {.handle = 2, .location = Point{0, 0, 0}};
   cosine.Strike(impulse);
+  cosine.EndStep();
   EXPECT_GT(Newest().pulse.duration_s(), 2 * hard.duration_s());
   EXPECT_EQ(Newest().pulse, Newest(1).pulse);
 }
@@ -355,6 +352,7 @@ TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefus
   distant.contact.impulse.location = Point{-0.3, 0, 0};
   intake.Strike(distant);
   intake.Strike(SmallImpulse(1, 0));
+  intake.EndStep();
   EXPECT_EQ(target_.events.size(), 2U);
   // 0.45 kg, sound at 5.1 km/s.
   intake.Strike(SmallImpulse(1, 2.2e4));

@@ -55,6 +55,7 @@ TEST_F(ContactStreamTest, AContactSoundsAtTheFirstStepsArrivalPlusItsTimePlusThe
   ASSERT_TRUE(stream->intake().BeginStep(100.0).ok());  // this simulation starts at 100 s
   ASSERT_TRUE(stream->intake().BeginStep(100.5).ok());
   stream->intake().Strike(SmallImpulse(1, 1, 0.25));
+  stream->intake().EndStep();
   const double expected = (0.5 + 0.25 + 0.02) * kRate;
   EXPECT_EQ(Onset(Render(40000)), expected + 1);  // sin(0) is silent
 }
@@ -71,6 +72,7 @@ TEST_F(ContactStreamTest, TheSecondObjectOfAContactFeelsTheOpposite) {
   const auto stream = Open(0);
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   stream->intake().Strike(PairImpulse());
+  stream->intake().EndStep();
   // Two equal bodies, struck at once with opposite impulses: nothing is left but rounding, 100 dB
   // below one of them.
   for (const float sample : Render(4800)) EXPECT_LT(std::abs(sample), 2e-7);
@@ -83,6 +85,7 @@ TEST_F(ContactStreamTest, TheImpulseOnTheSecondObjectIsTurnedIntoItsFrame) {
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   // Half a turn about z: what was opposite is alike, and both sound as one struck twice as hard.
   stream->intake().Strike(PairImpulse(Quaternion{.w = 0, .z = 1}));
+  stream->intake().EndStep();
   const std::vector<float> both = Render(4800);
   Mixer alone;
   SceneRegistry scenes(alone);
@@ -91,6 +94,7 @@ TEST_F(ContactStreamTest, TheImpulseOnTheSecondObjectIsTurnedIntoItsFrame) {
   const auto other = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
   ASSERT_TRUE(other->intake().BeginStep(0).ok());
   other->intake().Strike(SmallImpulse(1, 2));
+  other->intake().EndStep();
   std::vector<float> twice(4864);
   alone.Render(twice);
   for (size_t n = 0; n < both.size(); ++n) EXPECT_NEAR(both[n], twice[n], 1e-6) << n;
@@ -100,10 +104,12 @@ TEST_F(ContactStreamTest, AContactWithAnUnknownSecondObjectIsRejectedForBoth) {
   const auto stream = Open(0);
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   stream->intake().Strike(PairImpulse());
+  stream->intake().EndStep();
   EXPECT_EQ(stream->counts().rejected_count, 2U);
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("OBJECT_NOT_FOUND"));
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
   stream->intake().Strike(PairImpulse(Quaternion{.w = 2}));
+  stream->intake().EndStep();
   EXPECT_EQ(stream->counts().rejected_count, 4U);
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("INVALID_POSE"));
   EXPECT_EQ(Onset(Render(4800)), 4800U);
@@ -140,6 +146,7 @@ TEST_F(ContactStreamTest, AnImpulseBetweenTwoFramesIsFirstHeardAtTheLater) {
   const auto stream = Open(0.02);
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   stream->intake().Strike(SmallImpulse(1, 1, 0.5 / kRate));
+  stream->intake().EndStep();
   EXPECT_EQ(Onset(Render(4800)), 0.02 * kRate + 1);
 }
 
@@ -150,6 +157,7 @@ TEST_F(ContactStreamTest, WhatComesTooLateSoundsAtOnceAndIsCounted) {
   ASSERT_TRUE(stream->intake().BeginStep(0.05).ok());
   stream->intake().Strike(SmallImpulse(1));
   stream->intake().Strike(SmallImpulse(1, 1, 1));
+  stream->intake().EndStep();
   EXPECT_LE(Onset(Render(kBlock)), 1U);
   EXPECT_EQ(stream->counts().late_count, 1U);
   EXPECT_EQ(stream->counts().accepted_count, 1U);
@@ -208,10 +216,12 @@ TEST_F(ContactStreamTest, WithAtOnceContactsSoundWhenTheyComeAndNoneIsLate) {
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   Render(kBlock);  // the mixer goes on between the beginning of a step and its contacts
   stream->intake().Strike(SmallImpulse(1));
+  stream->intake().EndStep();
   EXPECT_LE(Onset(Render(640)), 1U);
   Render(480000);
   ASSERT_TRUE(stream->intake().BeginStep(0.01).ok());
   stream->intake().Strike(SmallImpulse(1, 1, 0.001));
+  stream->intake().EndStep();
   Render(640);
   EXPECT_EQ(stream->counts().accepted_count, 2U);
   EXPECT_EQ(stream->counts().late_count + stream->counts().remap_count, 0U);
@@ -230,7 +240,10 @@ TEST_F(ContactStreamTest, AFullQueueDropsAndCounts) {
   const auto stream = Open(0.01);
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   constexpr uint64_t kCount = 20000;
-  for (uint64_t i = 0; i < kCount; ++i) stream->intake().Strike(SmallImpulse(1, 1e-6));
+  for (uint64_t i = 0; i < kCount; ++i) {
+    stream->intake().Strike(SmallImpulse(1, 1e-6, 1e-7 * static_cast<double>(i)));
+  }
+  stream->intake().EndStep();
   EXPECT_FALSE(stream->settled());
   Render(100 * kBlock);  // the mixer takes a bounded number of strikes a block
   const ContactCounts counts = stream->counts();
@@ -263,9 +276,11 @@ TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndThe
   };
   for (const auto& [impulse, reason] : cases) {
     stream->intake().Strike(impulse);
+    stream->intake().EndStep();
     EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr(reason));
   }
   stream->intake().Strike(SmallImpulse(1));
+  stream->intake().EndStep();
   EXPECT_LT(Onset(Render(4800)), 4800U);
   EXPECT_EQ(stream->counts().rejected_count, cases.size());
   EXPECT_EQ(stream->counts().accepted_count, 1U);
@@ -276,6 +291,7 @@ TEST_F(ContactStreamTest, OutlivesItsScene) {
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   ASSERT_TRUE(scenes_.DeleteScene(scene_).ok());
   stream->intake().Strike(SmallImpulse(1));
+  stream->intake().EndStep();
   EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("SCENE_NOT_FOUND: "));
 }
 

@@ -73,6 +73,7 @@ class DirectedObjects : public testing::Test {
         *scenes_.OpenContactStream(scene, {.step_s = kStepS, .scheduling_delay_s = 0});
     EXPECT_TRUE(stream->intake().BeginStep(0).ok());
     stream->intake().Strike(SmallImpulse(1, 0.01));
+    stream->intake().EndStep();
     Render(10);
     double square = 0;
     for (const float sample : Render(100)) square += double{sample} * sample;

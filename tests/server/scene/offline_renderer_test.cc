@@ -93,6 +93,7 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
     ASSERT_TRUE(stream->intake().BeginStep(time_s).ok());
     stream->intake().Strike(impulse);
+    stream->intake().EndStep();
     if (!renderer) renderer = Make(0.5, {.first_frame = *stream->first_frame(), .delay_s = 0.0071});
     StrikeAt(*renderer, time_s, impulse);
   });
@@ -172,6 +173,7 @@ TEST_P(PlacesTest, AreHeardBitForBitAsLiveAndForAnyNumberOfThreads) {
     if (time_s > last_s) MoveAt(stream->intake(), time_s);
     last_s = time_s;
     stream->intake().Strike(impulse);
+    stream->intake().EndStep();
   });
   const TimeMapping mapping{.first_frame = *stream->first_frame(), .delay_s = 0.0271};
   const std::vector<float> offline = RenderPlaced(space, 1, mapping, bodies_);

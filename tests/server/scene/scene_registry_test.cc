@@ -33,6 +33,7 @@ class Stage {
     const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
     ASSERT_TRUE(stream->intake().BeginStep(0).ok());
     stream->intake().Strike(SmallImpulse(handle));
+    stream->intake().EndStep();
     ASSERT_EQ(stream->counts().rejected_count, 0U);
   }
 
@@ -296,6 +297,7 @@ TEST(SceneRegistry, AnObjectThatRingsIsHeardWhereItGoesAndFromWhereTheListenerGo
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   stream->intake().Strike(SmallImpulse(handle));
+  stream->intake().EndStep();
   std::vector<float> sound(2 * 1280);
   const auto render = [&] {
     mixer.Render(sound);

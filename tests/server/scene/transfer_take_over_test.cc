@@ -76,6 +76,7 @@ class TransferStage {
     const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01, .scheduling_delay_s = 0});
     ASSERT_TRUE(stream->intake().BeginStep(0).ok());
     stream->intake().Strike(SmallImpulse(handle));
+    stream->intake().EndStep();
     ASSERT_EQ(stream->counts().rejected_count, 0U);
   }
 
@@ -158,6 +159,7 @@ TEST(TransferTakeOver, ABodyWithoutAudibleModesClicks) {
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
   // Ten times the mass times the speed of sound is the most that the body may bear.
   stream->intake().Strike(SmallImpulse(added->handle, 1e-3));
+  stream->intake().EndStep();
   EXPECT_EQ(stream->counts().rejected_count, 0U);
   const std::vector<float> click = stage.Render(20);
   EXPECT_GT(Peak(click), 0);

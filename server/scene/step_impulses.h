@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/scene/felt_contact.h"
+#include "server/scene/object_contact.h"
+
+namespace carillon {
+
+/// The located impulses of a simulation step, until the step ends. Impulses that strike an object
+/// at the same point and time, and last equally long, become one event with the sum of their
+/// vectors. That event sounds as they would one by one, because the sound is linear in the impulse,
+/// but it takes one place in the mixer's queues instead of many.
+class StepImpulses {
+ public:
+  /// What impulses have in common that become one event.
+  struct Key {
+    uint32_t handle = 0;
+    double time_offset_s = 0;
+    double duration_s = 0;
+    Point point{};
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+
+  /// An event of the step, with the number of its frame.
+  struct Struck {
+    Felt felt{};
+    double frame = 0;
+    Key key{};
+
+    /// Adds the vector of one more impulse.
+    void Add(const Vector3& impulse_newton_seconds);
+  };
+
+  StepImpulses() { table_.fill(kNone); }
+
+  /// Returns the event to which `impulse` may be added, or null. Only an impulse on one object, at
+  /// a point in space and with a stated duration, is ever added to another one.
+  Struck* Find(const ObjectImpulse& impulse);
+
+  /// Appends the event of `impulse` on one of its objects.
+  void Append(const ObjectImpulse& impulse, const Felt& felt, double frame);
+
+  /// Returns whether the events must be cleared before further ones are appended.
+  bool full() const { return struck_.size() + kMostObjects > kMostEvents; }
+
+  std::span<Struck> events() { return struck_; }
+  void Clear();
+
+ private:
+  static constexpr size_t kMostEvents = 4096;
+  static constexpr size_t kMostObjects = 2;  // of an impulse
+  // An event whose place in the table is taken by a later one is not found again.
+  static constexpr size_t kTableSize = 256;
+  static constexpr uint16_t kNone = UINT16_MAX;
+
+  std::vector<Struck> struck_;
+  std::array<uint16_t, kTableSize> table_{};  // indices of events by the hashes of their keys
+};
+
+}  // namespace carillon
