@@ -62,6 +62,18 @@ std::optional<double> ToDuration(const v1::ImpulseColumns& columns, int row) {
   return columns.duration_s(row);
 }
 
+double ToTimeOffset(const v1::ImpulseColumns& columns, int row) {
+  return columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row);
+}
+
+void ReadContact(const v1::ImpulseColumns& columns, int row, ObjectContact& contact) {
+  contact.handle = columns.object(row);
+  contact.impulse.location = ToArray(columns.point_m(), row);
+  contact.impulse.impulse_newton_seconds = ToArray(columns.impulse_newton_seconds(), row);
+  contact.impulse.duration_s = ToDuration(columns, row);
+  contact.second = ToSecond(columns, row);
+}
+
 }  // namespace
 
 absl::Status Validate(const v1::ImpulseColumns& columns) {
@@ -97,21 +109,15 @@ uint64_t CountContacts(const v1::ImpulseColumns& columns) {
   return static_cast<uint64_t>(columns.object_size() + seconds.size() - none);
 }
 
-ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row) {
-  return {.contact = {.handle = columns.object(row),
-                      .impulse = {.location = ToArray(columns.point_m(), row),
-                                  .impulse_newton_seconds =
-                                      ToArray(columns.impulse_newton_seconds(), row),
-                                  .duration_s = ToDuration(columns, row)},
-                      .second = ToSecond(columns, row)},
-          .time_offset_s = columns.time_offset_s().empty() ? 0 : columns.time_offset_s(row)};
+void ReadRow(const v1::ImpulseColumns& columns, int row, ObjectImpulse& impulse) {
+  ReadContact(columns, row, impulse.contact);
+  impulse.time_offset_s = ToTimeOffset(columns, row);
 }
 
-ObjectTouch ReadRow(const v1::EngineContactColumns& columns, int row) {
-  ObjectImpulse impulse = ReadRow(columns.impulses(), row);
-  ObjectTouch touch{.contact = impulse.contact,
-                    .partner = columns.partner().empty() ? 0 : columns.partner(row),
-                    .time_offset_s = impulse.time_offset_s};
+void ReadRow(const v1::EngineContactColumns& columns, int row, ObjectTouch& touch) {
+  ReadContact(columns.impulses(), row, touch.contact);
+  touch.time_offset_s = ToTimeOffset(columns.impulses(), row);
+  touch.partner = columns.partner().empty() ? 0 : columns.partner(row);
   if (!columns.travel_speed_m_per_s().empty()) {
     touch.roughness.travel_speed_m_per_s = columns.travel_speed_m_per_s(row);
   }
@@ -119,7 +125,6 @@ ObjectTouch ReadRow(const v1::EngineContactColumns& columns, int row) {
   if (columns.irregularity_length_m() != 0) {
     touch.roughness.irregularity_length_m = columns.irregularity_length_m();
   }
-  return touch;
 }
 
 Pose ReadRow(const v1::PoseColumns& columns, int row) {

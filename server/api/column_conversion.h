@@ -18,10 +18,13 @@ absl::Status Validate(const v1::PoseColumns& columns);
 /// Returns the number of contacts, counted once for each object. The columns need not be valid.
 uint64_t CountContacts(const v1::ImpulseColumns& columns);
 
-/// Reads one row. The columns must be valid. The field `hertz` of impulses is not read, because it
-/// holds for all rows: the caller converts it once and sets it on each contact.
-ObjectImpulse ReadRow(const v1::ImpulseColumns& columns, int row);
-ObjectTouch ReadRow(const v1::EngineContactColumns& columns, int row);
+/// Fills in a new contact from one row. The columns must be valid. The field `hertz` of impulses is
+/// not read, because it holds for all rows: the caller converts it once and sets it on each
+/// contact.
+void ReadRow(const v1::ImpulseColumns& columns, int row, ObjectImpulse& impulse);
+void ReadRow(const v1::EngineContactColumns& columns, int row, ObjectTouch& touch);
+
+/// Reads one row. The columns must be valid.
 Pose ReadRow(const v1::PoseColumns& columns, int row);
 
 }  // namespace carillon

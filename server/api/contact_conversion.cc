@@ -174,7 +174,7 @@ void ReadColumns(const char* list, const Columns& columns, ContactIntake& intake
   Batch<Contact> batch(intake, take, impulses.object_size());
   for (int row = 0; row < impulses.object_size(); ++row) {
     Contact& contact = batch.Next();
-    contact = ReadRow(columns, row);
+    ReadRow(columns, row, contact);
     contact.contact.impulse.hertz = *hertz;
     contact.contact.place = PlaceIn(list, impulses.object_size(), row);
   }

@@ -60,9 +60,12 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
         return Open(request.start());
       case v1::StreamContactsRequest::kStep:
         return Step(request.step());
+      case v1::StreamContactsRequest::kSteps:
+        for (const v1::ContactStep& step : request.steps().steps()) RETURN_IF_ERROR(Step(step));
+        return absl::OkStatus();
       default:
         return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
-                       "a request is neither start nor step");
+                       "a request is neither start nor step nor steps");
     }
   }
 
@@ -91,7 +94,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void RunTaking(const v1::StreamContactsRequest& request,
                  const std::function<void()>& step) override {
-    const size_t row_count = CountRows(request.step()) + CountListenerMoves(request.step());
+    size_t row_count = CountRowsOf(request.step());
+    for (const v1::ContactStep& one : request.steps().steps()) row_count += CountRowsOf(one);
     if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
     if (row_count > kMostRowsAtOnce) return RunInPool(step);
     if (turn_ == Turn::kPaid) return step();
@@ -99,9 +103,9 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     Pay(step);
   }
 
-  /// Returns the number of objects that hear a move of the listener in this step.
-  size_t CountListenerMoves(const v1::ContactStep& step) const {
-    return stream_ && step.has_listener() ? stream_->object_count() : 0;
+  /// Returns the number of rows, in which each object that hears a move of the listener counts.
+  size_t CountRowsOf(const v1::ContactStep& step) const {
+    return CountRows(step) + (stream_ && step.has_listener() ? stream_->object_count() : 0);
   }
 
   /// Runs the step on this thread, which is one of gRPC's, and spends the client's budget.

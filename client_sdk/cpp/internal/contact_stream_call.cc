@@ -4,6 +4,7 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/support/client_callback.h>
 
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <utility>
@@ -21,14 +22,18 @@ namespace {
 
 /// The daemon takes messages of 2 MiB (ServerLimits.message_bytes), with some bytes around a step.
 constexpr size_t kMostStepBytes = (size_t{2} << 20U) - 64;
+/// Steps that wait are sent together up to this size and number. The cost of a message is then
+/// small beside that of its steps, and Send() waits only briefly while they are put together.
+constexpr size_t kMostBytesTogether = size_t{64} << 10U;
+constexpr size_t kMostStepsTogether = 256;
 
 /// A call of StreamContacts, driven by gRPC's reactor.
 ///
-/// At most one write is in progress, that of `written_`; the next one, that of the front of
-/// `queue_`, starts when it is done. Because Send() starts writes from outside the reactor, a hold
-/// keeps gRPC from ending the call between two writes; the hold is released once, when no further
-/// write can start. A read of the next answer is always in progress until the daemon ends the
-/// stream.
+/// At most one write is in progress, that of `written_`; the next one, that of the steps at the
+/// front of `queue_`, starts when it is done. Because Send() starts writes from outside the
+/// reactor, a hold keeps gRPC from ending the call between two writes; the hold is released once,
+/// when no further write can start. A read of the next answer is always in progress until the
+/// daemon ends the stream.
 class ContactStreamCall final
     : public ContactStream,
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
@@ -61,11 +66,10 @@ class ContactStreamCall final
   }
 
   absl::Status Send(v1::ContactStep step) override {
-    if (step.ByteSizeLong() > kMostStepBytes) {
+    const size_t byte_count = step.ByteSizeLong();
+    if (byte_count > kMostStepBytes) {
       return Refusal(absl::StatusCode::kInvalidArgument, "STEP_TOO_LARGE",
-                     absl::StrCat("a step of ", step.ByteSizeLong(),
-                                  " bytes: the daemon takes at "
-                                  "most ",
+                     absl::StrCat("a step of ", byte_count, " bytes: the daemon takes at most ",
                                   kMostStepBytes, "; report fewer points"));
     }
     absl::MutexLock lock(&mutex_);
@@ -77,14 +81,14 @@ class ContactStreamCall final
       queue_.pop_front();
       ++dropped_step_count_;
     }
-    *queue_.emplace_back().mutable_step() = std::move(step);
+    queue_.push_back({.step = std::move(step), .byte_count = byte_count});
     if (!writing_) WriteNextLocked();
     return absl::OkStatus();
   }
 
   size_t WaitingStepCount() const override {
     absl::MutexLock lock(&mutex_);
-    return queue_.size() + (writing_ ? 1 : 0);
+    return queue_.size() + (writing_ ? written_step_count_ : 0);
   }
 
   uint64_t DroppedStepCount() const override {
@@ -107,6 +111,11 @@ class ContactStreamCall final
   }
 
  private:
+  struct QueuedStep {
+    v1::ContactStep step{};
+    size_t byte_count = 0;
+  };
+
   void OnWriteDone(bool ok) override {
     absl::MutexLock lock(&mutex_);
     writing_ = false;
@@ -137,9 +146,32 @@ class ContactStreamCall final
     status_ = result;
   }
 
-  void WriteNextLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    written_ = std::move(queue_.front());
+  /// Returns the number of waiting steps that the next message takes.
+  size_t CountTogetherLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    size_t count = 1, byte_count = queue_.front().byte_count;
+    while (count < std::min(queue_.size(), kMostStepsTogether)) {
+      byte_count += queue_[count].byte_count;
+      if (byte_count > kMostBytesTogether) break;
+      ++count;
+    }
+    return count;
+  }
+
+  v1::ContactStep TakeStepLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    v1::ContactStep step = std::move(queue_.front().step);
     queue_.pop_front();
+    return step;
+  }
+
+  void WriteNextLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    written_step_count_ = CountTogetherLocked();
+    if (written_step_count_ == 1) {
+      *written_.mutable_step() = TakeStepLocked();
+    } else {
+      auto& steps = *written_.mutable_steps()->mutable_steps();
+      steps.Clear();
+      for (size_t i = 0; i < written_step_count_; ++i) *steps.Add() = TakeStepLocked();
+    }
     writing_ = true;
     StartWrite(&written_);
   }
@@ -167,8 +199,9 @@ class ContactStreamCall final
   v1::StreamContactsResponse answer_;    ///< belongs to the read in progress
   v1::StreamContactsRequest written_{};  ///< belongs to the write in progress
   mutable absl::Mutex mutex_;
-  std::deque<v1::StreamContactsRequest> queue_ ABSL_GUARDED_BY(mutex_);
+  std::deque<QueuedStep> queue_ ABSL_GUARDED_BY(mutex_);
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
+  size_t written_step_count_ ABSL_GUARDED_BY(mutex_) = 0;  ///< of `written_`
   uint64_t dropped_step_count_ ABSL_GUARDED_BY(mutex_) = 0;
   v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);
   std::optional<absl::Status> status_ ABSL_GUARDED_BY(mutex_);

@@ -34,7 +34,7 @@ class NoTarget final : public EventTarget {
 Told Read(const v1::ContactStep& step) {
   Told told;
   for (int row = 0; row < step.columns().object_size() && Validate(step.columns()).ok(); ++row) {
-    told.impulses.push_back(ReadRow(step.columns(), row));
+    ReadRow(step.columns(), row, told.impulses.emplace_back());
   }
   const v1::PoseColumns& poses = step.pose_columns();
   for (int row = 0; row < poses.object_size() && Validate(poses).ok(); ++row) {
@@ -180,7 +180,8 @@ TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
     columns.add_travel_speed_m_per_s(static_cast<float>(partner) / 2);
   }
   ASSERT_TRUE(Validate(columns).ok());
-  const ObjectTouch touch = ReadRow(columns, 2);
+  ObjectTouch touch;
+  ReadRow(columns, 2, touch);
   EXPECT_EQ(touch.contact.second->handle, 8U);
   EXPECT_FLOAT_EQ(static_cast<float>(touch.time_offset_s), 0.002F);
   EXPECT_EQ(touch.partner, 6U);

@@ -247,6 +247,31 @@ TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
   EXPECT_DOUBLE_EQ(last.output_latency_s(), 8 * 128 / 48000.0);  // the null device adds none
 }
 
+TEST_F(SceneApi, StepsOfOneMessageAreTakenAsIfEachCameAlone) {
+  const std::string scene = CreateScene();
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(SmallObject(scene), added).ok());
+  v1::StreamContactsRequest together;
+  // More rows than gRPC's thread takes at once.
+  for (int i = 0; i < 300; ++i) {
+    v1::ContactStep& step = *together.mutable_steps()->add_steps();
+    step.set_time_s(0.01 * i);
+    *step.add_impulses() = Strike(1);
+    if (i == 7) *step.add_impulses() = Strike(99);
+  }
+  v1::StreamContactsResponse last;
+  ASSERT_TRUE(Exchange({Start(scene), together}, last).ok());
+  EXPECT_EQ(last.step_count(), 300U);
+  EXPECT_EQ(last.accepted_count() + last.late_count(), 300U);
+  EXPECT_EQ(last.rejected_count(), 1U);
+  EXPECT_THAT(last.last_rejection().message(), testing::HasSubstr("at 0.07 s"));
+  together.mutable_steps()->mutable_steps(150)->set_time_s(0.3);
+  const grpc::Status refused = Exchange({Start(scene), together}, last);
+  ExpectRefused(refused, grpc::INVALID_ARGUMENT, "INVALID_STREAM");
+  EXPECT_THAT(refused.error_message(), testing::HasSubstr("at step 150"));
+  ExpectRefused(Exchange({together}, last), grpc::INVALID_ARGUMENT, "STREAM_NOT_STARTED");
+}
+
 TEST_F(SceneApi, TheFirstAnswerComesBeforeAnyStep) {
   const std::string scene = CreateScene();
   grpc::ClientContext context;
