@@ -126,6 +126,9 @@ TEST(OtherLabel, SaysThatAModelKeepsItsLabel) {
               HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' does not name"));
   EXPECT_EQ(OtherLabel(model, "key_maple"), "");
   EXPECT_EQ(OtherLabel(model, std::string(201, 'x')), "");
+  // The daemon would cut the second label within a letter, and leaves that letter out.
+  EXPECT_NE(OtherLabel(model, std::string(198, 'x') + "ö"), "");
+  EXPECT_EQ(OtherLabel(model, std::string(199, 'x') + "ö"), "");
 }
 
 TEST(SharedLabel, SaysHowToNameEachModelOfALabel) {
