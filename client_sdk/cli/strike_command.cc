@@ -115,7 +115,7 @@ absl::Status WriteTrace(const v1::SoundingObject& object, const StrikeOptions& o
   writer.Write(body);
   v1::ContactStep step;
   *step.add_impulses() = ImpulseOf(options, object.handle());
-  writer.Write(step);
+  RETURN_IF_ERROR(writer.Write(step));
   return writer.Close();
 }
 

@@ -43,12 +43,11 @@ class Trace {
     return own;
   }
 
-  /** Adds a step, as ContactStream.step sends one. Times must not go back. */
+  /**
+   * Adds a step, as ContactStream.step sends one. Throws CarillonError (INVALID_STREAM) and adds nothing if the time is
+   * not finite or goes back.
+   */
   step(time, content) {
-    const last = this.steps.at(-1)?.time_s ?? 0;
-    if (this.steps.length && time < last) {
-      throw new RangeError(`time goes back from ${last} to ${time} s; add the steps in order`);
-    }
     if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
       throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
         'stream: new Trace({ step: 1 / 240 })');
@@ -60,7 +59,23 @@ class Trace {
           'returned');
       }
     }
-    this.steps.push(makeStep(time, content));
+    const made = makeStep(time, content);
+    this.refuseTime(time);
+    this.steps.push(made);
+  }
+
+  /** Throws CarillonError (INVALID_STREAM) if no step can have the time after the last one. */
+  refuseTime(time) {
+    const number = this.steps.length;
+    if (!Number.isFinite(time)) {
+      throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
+        'seconds');
+    }
+    const last = this.steps.at(-1)?.time_s ?? 0;
+    if (number && time < last) {
+      throw new CarillonError('INVALID_STREAM', `time goes back from ${last} s to ${time} s at step ${number}; make ` +
+        'another trace for another run');
+    }
   }
 
   /** The header, the objects, then the steps, each a ContactTraceRecord. */

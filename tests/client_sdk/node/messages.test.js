@@ -239,6 +239,18 @@ test('a trace of contacts needs the length of its steps, as a stream does', () =
   new carillon.Trace({ step: 1 / 240 }).step(0, { contacts });
 });
 
+test('a step whose time is not finite or goes back is refused, and the trace can be continued', () => {
+  const trace = new carillon.Trace();
+  for (const time of [NaN, Infinity]) {
+    assert.throws(() => trace.step(time), { name: 'CarillonError', reason: 'INVALID_STREAM' });
+  }
+  trace.step(-1);
+  trace.step(2);
+  assert.throws(() => trace.step(1.5), { reason: 'INVALID_STREAM', message: /goes back from 2 s to 1\.5 s at step 2;/ });
+  trace.step(2);
+  assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
+});
+
 test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],

@@ -234,6 +234,22 @@ class RefusalsTest(MessagesTest):
         carillon.Trace().step(0, impulses=impulses)
         carillon.Trace(step=1 / 240).step(0, contacts=contacts)
 
+    def test_a_step_whose_time_is_not_finite_or_goes_back_is_refused_and_the_trace_can_be_continued(self):
+        trace = carillon.Trace()
+
+        def refused(expected, time):
+            with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:
+                trace.step(time)
+            self.assertEqual(raised.exception.reason, "INVALID_STREAM")
+
+        for time in (numpy.nan, numpy.inf):
+            refused("the time of step 0 is", time)
+        trace.step(-1)
+        trace.step(2)
+        refused(r"time goes back from 2 s to 1\.5 s at step 2;", 1.5)
+        trace.step(2)
+        self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
+
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
