@@ -138,6 +138,7 @@ class WrongValuesTest(unittest.TestCase):
                                 ((*create, "--memory-limit-mib", "-3"), "--memory-limit-mib"),
                                 (("transfer", "create", "bar", "--size", "0"), "--size"),
                                 (("listen", "--out", "x.ogg"), "must end with .wav"),
+                                (("listen", "--seconds", "0"), "leave --seconds out to record until the program"),
                                 (("model", "export", "bar", "--out", "x.obj"), "must end with .model, .glb"),
                                 (("example", "bar", "--out", "x.stl"), "must end with .obj"),
                                 (("--json", "listen"), "--json: stdout has the sound"),
