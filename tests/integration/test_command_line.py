@@ -97,6 +97,7 @@ class ListsTest(CommandLineTest):
         self.assertEqual(told["fault_count"], sum(found["verdict"] == "FAULT" for found in told["findings"]))
         self.assertEqual(told["fault_count"], healthy.stdout.count("FAULT  "))
         self.assertIn({"subject": "tls", "verdict": "OK", "text": "not needed on this machine"}, told["findings"])
+        self.assertNotIn("slurm", healthy.stdout)  # this daemon has local workers
         nobody = carillon("--server", f"unix:{self.folder}/nobody", "doctor")
         self.assertEqual(nobody.returncode, 1)
         self.assertRegex(nobody.stdout, "FAULT  socket .* start carillond")
