@@ -185,7 +185,9 @@ class Client {
 
   /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
   async model(text, material) {
-    if (typeof text !== 'string') refuse(text, 'the model', 'its label, its name, or the first digits of its digest');
+    if (typeof text !== 'string' || !text.replace(MODELS, '')) {
+      refuse(text, 'the model', 'its label, its name, or the first digits of its digest');
+    }
     const name = text.startsWith(MODELS) ? text : await this.find(text);
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
     return new Model(this, answer.modal_model, material ?? answer.modal_model.material ?? undefined);
@@ -207,7 +209,7 @@ class Client {
     const names = [];
     const labels = [];
     for await (const { name, label } of this.models()) {
-      if (label === text || (text && name.slice(MODELS.length).startsWith(text))) names.push(name);
+      if (label === text || name.slice(MODELS.length).startsWith(text)) names.push(name);
       if (label) labels.push(label);
     }
     if (names.length === 1) return names[0];

@@ -251,6 +251,15 @@ test('a step whose time is not finite or goes back is refused, and the trace can
   assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
 });
 
+test('an empty name of a model is refused with the name of the argument', async () => {
+  for (const text of ['', 'modalModels/', 3]) {
+    await assert.rejects(c.model(text), { name: 'TypeError',
+      message: `the model is ${inspect(text)}; it must be its label, its name, or the first digits of its digest` });
+  }
+  await assert.rejects(scene.add(''), /^TypeError: the model is ''; it must be a Model/);
+  assert.throws(() => new carillon.Trace().add(''), /^TypeError: the model is ''; it must be a Model/);
+});
+
 test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],

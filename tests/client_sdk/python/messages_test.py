@@ -250,6 +250,13 @@ class RefusalsTest(MessagesTest):
         trace.step(2)
         self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
 
+    def test_an_empty_name_of_a_model_is_refused_with_the_name_of_the_argument(self):
+        for text in ("", "modalModels/", None):
+            self.refused(f"the model is {text!r}; it must be its label, its name, or the first digits of its digest",
+                         self.c.model, text)
+        for add in (carillon.Scene(self.c, "scenes/1").add, carillon.Trace().add):
+            self.refused("the model is ''; it must be a Model, or its name", add, "", "oak")
+
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
