@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { defaultServer } = require('./address');
-const { choice, nearest, refuse, refuseNoMessage, refuseUnknown } = require('./checks');
+const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
@@ -226,6 +226,7 @@ class Client {
   setVolume(volume) {
     refuseUnknown(volume, ['gain', 'muted'], 'setVolume');
     const { gain, muted } = volume;
+    refuseNoNumbers({ gain }, 'setVolume');
     return this.call('AudioService', 'UpdateMixer', { ...given('gain', gain), ...given('muted', muted) });
   }
 
@@ -242,6 +243,7 @@ class Client {
     refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene', 'CreateSceneRequest');
     const { hearing, listener, gain, keep = false, id } = settings;
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
+    refuseNoNumbers({ gain }, 'createScene');
     const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),
       ...given('gain', gain), keep, ...given('id', id) };
     const made = await this.call('SceneService', 'CreateScene', request);

@@ -3,7 +3,7 @@
 
 const fs = require('fs/promises');
 const util = require('util');
-const { choice, counted, refuseNoMessage, refuseUnknown } = require('./checks');
+const { choice, counted, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { given, makeStep, objectsOf, present, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
@@ -26,6 +26,7 @@ class Trace {
   constructor(own = {}) {
     refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape'], 'Trace');
     const { step, simulator, hearing, listener, ...settings } = own;
+    refuseNoNumbers({ step }, 'Trace');
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
     this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step }),
       ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')), ...streamSettings(settings) };
@@ -37,6 +38,7 @@ class Trace {
   add(model, settings = {}) {
     refuseUnknown(settings, ['material', 'size', 'gain', 'pose', 'label', 'handle', 'radiation'], 'add');
     const { material, size = 1, gain = 1, pose, label, handle, radiation } = settings;
+    refuseNoNumbers({ size, gain }, 'add');
     const own = toHandle(handle) || 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
     this.objects.push({ handle: own, ...named(model, material), size, gain, ...present({ label }),
       ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) });

@@ -260,6 +260,32 @@ test('an empty name of a model is refused with the name of the argument', async 
   assert.throws(() => new carillon.Trace().add(''), /^TypeError: the model is ''; it must be a Model/);
 });
 
+test('text in place of a number is refused with the name of the field', async () => {
+  const refusedText = async (name, call) => assert.rejects(async () => call(), { name: 'TypeError',
+    message: `${name} is '0.5'; it must be a number` });
+  const text = '0.5';
+  const row = { object: 1, point: POINT, impulse: IMPULSE };
+  const trace = new carillon.Trace({ step: 1 / 240 });
+  for (const [name, call] of [
+    ['gain of add', () => scene.add('modalModels/1', { gain: text })],
+    ['size of object 0 of addAll', () => scene.addAll([{ model: 'modalModels/1', size: text }])],
+    ['gain of add', () => trace.add('modalModels/1', { gain: text })],
+    ['gain of update', () => bell.update({ gain: text })], ['glide of update', () => bell.update({ glide: text })],
+    ['gain of update', () => scene.update({ gain: text })], ['gain of setVolume', () => c.setVolume({ gain: text })],
+    ['gain of createScene', () => c.createScene({ gain: text })],
+    ['glide of moveListener', () => scene.moveListener(POINT, text)],
+    ['step of stream', () => scene.stream({ step: text })],
+    ['delay of stream', () => scene.stream({ step: 0.01, delay: text })],
+    ['step of Trace', () => new carillon.Trace({ step: text })],
+    ['timeOffset of impulses[0]', () => trace.step(0, { impulses: [{ ...row, timeOffset: text }] })],
+    ['roughnessDepth of contacts', () => trace.step(0, { contacts: { objects: 1, points: POINT, impulses: IMPULSE,
+      roughnessDepth: text } })],
+    ['seconds of renderStrike', () => new carillon.Model(c, { name: 'modalModels/1' }).renderStrike({ point: POINT,
+      impulse: IMPULSE, seconds: text })],
+  ]) await refusedText(name, call);
+  assert.equal(trace.objects.length + trace.steps.length, 0);
+});
+
 test('refusals of the daemon have the names of the caller', () => {
   for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
     ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
