@@ -6,10 +6,11 @@ const assert = require('node:assert/strict');
 const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
-const { fromInfo } = require('carillon/lib/errors');
+const { Metadata } = require('@grpc/grpc-js');
+const { fromCall, fromInfo } = require('carillon/lib/errors');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
-const { warnOfContacts, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
+const { warnOfContacts, warnOfLabel, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
@@ -284,6 +285,19 @@ test('text in place of a number is refused with the name of the field', async ()
       impulse: IMPULSE, seconds: text })],
   ]) await refusedText(name, call);
   assert.equal(trace.objects.length + trace.steps.length, 0);
+});
+
+test('a label that the daemon would cut within a letter is not told as another one', async () => {
+  const longest = `${'x'.repeat(198)}ö`; // 200 bytes
+  const toldOf = (wanted) => warningsOf(() => warnOfLabel('bell', wanted));
+  assert.equal((await toldOf(longest)).length, 1);
+  assert.deepEqual(await toldOf(`x${longest}`), []);
+});
+
+test('a message that is too large tells how to repair it', () => {
+  const error = { code: 8, details: 'Received message larger than max (2500022 vs. 2097152)', metadata: new Metadata() };
+  assert.equal(fromCall(error, 'unix:/nowhere').message, 'MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon ' +
+    'takes at most 2097152; report fewer points in a step, or ask for less in one call');
 });
 
 test('refusals of the daemon have the names of the caller', () => {

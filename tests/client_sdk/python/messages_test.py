@@ -257,6 +257,21 @@ class RefusalsTest(MessagesTest):
         for add in (carillon.Scene(self.c, "scenes/1").add, carillon.Trace().add):
             self.refused("the model is ''; it must be a Model, or its name", add, "", "oak")
 
+    def test_a_message_that_is_too_large_tells_how_to_repair_it(self):
+        class TooLarge(grpc.RpcError):
+            def trailing_metadata(self):
+                return ()
+
+            def code(self):
+                return grpc.StatusCode.RESOURCE_EXHAUSTED
+
+            def details(self):
+                return "Received message larger than max (2500022 vs. 2097152)"
+
+        self.assertEqual(str(carillon.errors.from_rpc(TooLarge(), "unix:/nowhere")),
+                         "MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon takes at most 2097152; report "
+                         "fewer points in a step, or ask for less in one call")
+
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
