@@ -163,7 +163,8 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .head_file = options.head_file,
           .version = kVersion,
           .scene_grace_s = options.scene_grace_s,
-          .client_share = options.client_share};
+          .client_share = options.client_share,
+          .slurm = options.executor == "slurm"};
 }
 
 /// The present settings with those of `read` that can change while the daemon runs.

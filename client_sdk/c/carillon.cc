@@ -332,8 +332,7 @@ carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* st
   return Try([&]() -> absl::Status {
     if (!trace || !step) return Missing("an argument");
     ASSIGN_OR_RETURN(const v1::ContactStep made, carillon::c::ToStep(*step));
-    trace->writer.Write(made);
-    return absl::OkStatus();
+    return trace->writer.Write(made);
   });
 }
 

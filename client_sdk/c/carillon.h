@@ -232,7 +232,8 @@ carillon_code carillon_create_trace(const char* file, double step_s, carillon_fr
 /** Adds an object, before the first step that names it. `handle` may be null. */
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
-/** Writes a step to the trace. */
+/** Writes a step to the trace. A step whose time is not finite or goes back is refused with
+ * INVALID_STREAM and not written, and the trace can be continued. */
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
 /** Completes the file. */
 carillon_code carillon_close_trace(carillon_trace* trace);

@@ -128,7 +128,9 @@ class ClipRenderer {
     while (true) {
       ASSIGN_OR_RETURN(std::optional<v1::ContactTraceRecord> record, trace.Next());
       if (!record) return copy.Close();
-      if (record->has_step()) copy.Write(record->step());
+      if (record->has_step()) {
+        RETURN_IF_ERROR(copy.Write(record->step()));
+      }
       if (!record->has_object()) continue;
       if (record->object().handle() != handle) record->mutable_object()->set_gain(0);
       copy.Write(record->object());

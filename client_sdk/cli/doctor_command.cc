@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/doctor_command.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -140,14 +141,14 @@ void CheckWorkers(const client::Client& daemon, Findings& findings) {
   }
 }
 
-void CheckSlurm(Findings& findings) {
-  if (!Succeeds({"sh", "-c", "command -v sinfo >&2"})) {
-    return findings.Good("slurm", "not installed here: decompositions run on this machine");
-  }
+/// Finds nothing about Slurm where the daemon does not use it.
+void CheckSlurm(const client::Client& daemon, Findings& findings) {
+  const auto info = daemon.GetServerInfo();
+  if (!info.ok() || std::ranges::count(info->features(), "slurm") == 0) return;
   if (Succeeds({"sinfo", "--noheader"})) return findings.Good("slurm", "the cluster answers");
   findings.Unknown("slurm",
-                   "sinfo does not answer: a daemon with --executor slurm could run no job; see "
-                   "that slurmctld runs");
+                   "sinfo does not answer here, and the daemon runs its decompositions on the "
+                   "cluster: see that slurmctld runs");
 }
 
 void CheckTls(const Program& program, Findings& findings) {
@@ -191,7 +192,6 @@ void CheckDaemon(const Program& program, Findings& findings) {
   const auto daemon = program.Daemon();
   const auto mixer = daemon->GetMixer();
   CheckProcess(program, findings);
-  CheckSlurm(findings);
   if (!mixer.ok()) return findings.Bad("daemon", Text(mixer.status()));
   const bool same = mixer->version() == CARILLON_VERSION;
   const std::string version = absl::StrCat("carillond ", mixer->version(), " at ", program.server);
@@ -201,6 +201,7 @@ void CheckDaemon(const Program& program, Findings& findings) {
   CheckSound(*daemon, *mixer, findings);
   CheckDatabase(*daemon, findings);
   CheckWorkers(*daemon, findings);
+  CheckSlurm(*daemon, findings);
   CheckTls(program, findings);
   CheckCertificates(*daemon, findings);
 }

@@ -104,14 +104,20 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
 
 absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json) {
   ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
+  // The daemon answers alike for a job that this call cancels and for one that was cancelled
+  // before.
+  ASSIGN_OR_RETURN(const v1::Job before, daemon.GetJob(name));
   ASSIGN_OR_RETURN(const v1::Job job, daemon.CancelJob(name));
-  const bool failed = job.state() == v1::JOB_STATE_FAILED;
-  if (failed || job.state() == v1::JOB_STATE_SUCCEEDED) {
-    absl::FPrintF(stderr, "carillon: %s is not cancelled, because it has already %s\n", job.name(),
-                  failed ? absl::StrCat("failed (", job.error().reason(), ")") : "succeeded");
-  }
   if (json) PrintJson(job);
-  return absl::OkStatus();
+  std::string end;
+  if (job.state() == v1::JOB_STATE_SUCCEEDED) end = "succeeded";
+  if (job.state() == v1::JOB_STATE_FAILED) {
+    end = absl::StrCat("failed (", job.error().reason(), ")");
+  }
+  if (before.state() == v1::JOB_STATE_CANCELLED) end = "been cancelled";
+  if (end.empty()) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kFailedPrecondition, "JOB_ENDED",
+                 absl::StrCat(job.name(), " has already ", end, ", so there is nothing to cancel"));
 }
 
 absl::Status ListMaterials(const client::Client& daemon, bool json) {

@@ -188,8 +188,9 @@ void AddListen(CLI::App& app, Program& program) {
       ->check([](const std::string& path) {
         return WhyNotWritten(path, {".wav", ".wave"});
       });
-  TakeSeconds(*listen.add_option("--seconds", options->seconds,
-                                 "The time to record, s [until the program is stopped]"));
+  TakeWithin(*listen.add_option("--seconds", options->seconds,
+                                "The time to record, s [until the program is stopped]"),
+             0.001, 1e9, "leave --seconds out to record until the program is stopped");
   listen.add_option("--scene", options->scene,
                     "The name or the number of a scene to record alone [the output]");
   listen.add_flag("--quiet", options->quiet, "Show no level on the terminal");

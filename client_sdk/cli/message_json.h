@@ -18,7 +18,7 @@ std::string MessageJson(const google::protobuf::Message& message);
 /// A member of a JSON object that is no message of the contract.
 struct JsonMember {
   const char* name;
-  std::variant<std::string, uint64_t, double> value;
+  std::variant<std::string, uint64_t, double, std::vector<std::string>> value;
 };
 
 /// Returns an object with the members in their order, as JSON in one line. Text that is not UTF-8,

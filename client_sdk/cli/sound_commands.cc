@@ -79,7 +79,7 @@ absl::Status RecordContacts(const client::Client& daemon, const std::string& sce
     } else if (record.has_object() && writer) {
       writer->Write(record.object());
     } else if (record.has_step() && writer) {
-      writer->Write(record.step());
+      written = writer->Write(record.step());
       ++step_count;
     }
     return written.ok() && !stop.ArrivesWithin(0);

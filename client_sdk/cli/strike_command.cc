@@ -70,9 +70,9 @@ v1::Impulse ImpulseOf(const StrikeOptions& options, uint32_t handle) {
   return impulse;
 }
 
-/// Sends the strike so that it sounds on arrival.
-absl::Status SendImpulse(const client::Client& daemon, const std::string& scene, uint32_t handle,
-                         const StrikeOptions& options) {
+/// Sends the strike so that it sounds on arrival. Returns the warning about it, or an empty string.
+absl::StatusOr<std::string> SendImpulse(const client::Client& daemon, const std::string& scene,
+                                        uint32_t handle, const StrikeOptions& options) {
   v1::ContactStreamStart start;
   start.set_scene(scene);
   start.set_step_s(kStep);
@@ -82,14 +82,14 @@ absl::Status SendImpulse(const client::Client& daemon, const std::string& scene,
   *step.add_impulses() = ImpulseOf(options, handle);
   RETURN_IF_ERROR(stream->Send(std::move(step)));
   ASSIGN_OR_RETURN(const auto report, stream->Finish());
-  if (report.findings().distant_point_count() > 0) {
-    absl::FPrintF(stderr,
-                  "warning: the point is %.3g m from the surface, and the strike sounds at the "
-                  "nearest point of the surface; give metres in the frame of the object\n",
-                  report.findings().largest_distance_m());
+  if (report.rejected_count() > 0) {
+    return FromErrorInfo(absl::StatusCode::kInvalidArgument, report.last_rejection());
   }
-  if (report.rejected_count() == 0) return absl::OkStatus();
-  return FromErrorInfo(absl::StatusCode::kInvalidArgument, report.last_rejection());
+  if (report.findings().distant_point_count() == 0) return "";
+  return absl::StrFormat(
+      "the point is %.3g m from the surface, and the strike sounds at the nearest point of the "
+      "surface; give metres in the frame of the object",
+      report.findings().largest_distance_m());
 }
 
 /// The strike as a rendering measures it.
@@ -115,7 +115,7 @@ absl::Status WriteTrace(const v1::SoundingObject& object, const StrikeOptions& o
   writer.Write(body);
   v1::ContactStep step;
   *step.add_impulses() = ImpulseOf(options, object.handle());
-  writer.Write(step);
+  RETURN_IF_ERROR(writer.Write(step));
   return writer.Close();
 }
 
@@ -166,12 +166,14 @@ void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
   }
 }
 
-/// Prints the object, how long it is heard and, where the daemon could measure them, the contact's
-/// duration, the peak, and the frames that the limiter lowers.
+/// Prints the object, how long it is heard, the warning if there is one and, where the daemon could
+/// measure them, the contact's duration, the peak, and the frames that the limiter lowers.
 void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& object,
-                     const StrikeOptions& options) {
-  std::vector<JsonMember> members = {
-      {"seconds", options.seconds.value_or(SoundingSeconds(object))}};
+                     const StrikeOptions& options, const std::string& warning) {
+  std::vector<std::string> warnings;
+  if (!warning.empty()) warnings.push_back(warning);
+  std::vector<JsonMember> members = {{"seconds", options.seconds.value_or(SoundingSeconds(object))},
+                                     {"warnings", warnings}};
   if (const auto measured = Measure(daemon, object, options)) {
     members.push_back({"contact_duration_s", measured->duration_s});
     members.push_back({"peak_pa", measured->peak_pa});
@@ -183,9 +185,10 @@ void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& obj
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
                       const StrikeOptions& options, const StopSignal& stop, bool json) {
   ASSIGN_OR_RETURN(const auto object, AddObject(daemon, scene, options));
-  RETURN_IF_ERROR(SendImpulse(daemon, scene, object.handle(), options));
+  ASSIGN_OR_RETURN(const std::string warning, SendImpulse(daemon, scene, object.handle(), options));
+  if (!warning.empty()) absl::FPrintF(stderr, "warning: %s\n", warning);
   if (json) {
-    PrintStrikeJson(daemon, object, options);
+    PrintStrikeJson(daemon, object, options, warning);
   } else {
     PrintStrike(daemon, object, options);
   }

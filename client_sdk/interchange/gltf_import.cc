@@ -22,6 +22,7 @@
 #include "client_sdk/interchange/gltf_surface.h"
 #include "client_sdk/interchange/header_json.h"
 #include "proto/cpp/status_macros.h"
+#include "proto/cpp/utf8.h"
 
 namespace carillon::interchange {
 namespace {
@@ -220,7 +221,7 @@ void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel&
 std::string ShortText(const json& value) {
   std::string text = Text(value);
   size_t size = std::min<size_t>(text.size(), 200);
-  while (size < text.size() && (static_cast<unsigned char>(text[size]) & 0xc0U) == 0x80U) --size;
+  while (size < text.size() && ContinuesCharacter(text[size])) --size;
   text.resize(size);
   return text;
 }

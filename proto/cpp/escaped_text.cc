@@ -5,11 +5,10 @@
 #include <cstdint>
 
 #include "absl/strings/str_format.h"
+#include "proto/cpp/utf8.h"
 
 namespace carillon {
 namespace {
-
-bool Continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80; }
 
 /// Returns the number of bytes of the character with which `text` begins, or 0 if the bytes are not
 /// UTF-8. `code` gets the character.
@@ -20,7 +19,7 @@ size_t ReadCharacter(std::string_view text, uint32_t& code) {
   if ((first >= 0x80 && first < 0xC2) || first > 0xF4 || text.size() < size) return 0;
   code = size == 1 ? first : first & (0x7FU >> size);
   for (size_t i = 1; i < size; ++i) {
-    if (!Continues(text[i])) return 0;
+    if (!ContinuesCharacter(text[i])) return 0;
     code = (code << 6U) | (static_cast<unsigned char>(text[i]) & 0x3FU);
   }
   constexpr uint32_t kLeast[] = {0, 0, 0x80, 0x800, 0x10000};

@@ -133,6 +133,7 @@ struct ApiServer::State {
                      .scene_grace_s = settings.scene_grace_s,
                      .certificate_end = certificate_end,
                      .binaural = heads.available(),
+                     .slurm = settings.slurm,
                      .can_decompose = rooms.can_decompose},
                     rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output) {}

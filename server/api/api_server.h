@@ -41,6 +41,8 @@ struct ApiSettings {
   double client_share = 0.5;
   /// Seconds after which a rendering ends if its client neither sends nor reads.
   double rendering_idle_s = 60;
+  /// Whether decompositions run on the cluster that Slurm manages.
+  bool slurm = false;
 };
 
 /// The rooms that the server serves. All of them must outlive it.

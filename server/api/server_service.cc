@@ -34,6 +34,7 @@ void ServerService::DescribeFeatures(v1::GetServerInfoResponse& info) const {
   if (facts_.can_decompose()) info.add_features("decomposition");
   info.add_features("job-filters");
   info.add_features("scene-ids");
+  if (facts_.slurm) info.add_features("slurm");
   if (decompositions_.settings().transfers) info.add_features("transfers");
 }
 

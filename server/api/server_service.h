@@ -26,6 +26,7 @@ struct ServerFacts {
   double scene_grace_s = 0;
   const CertificateEnd& certificate_end;
   bool binaural = false;                ///< whether a measured head is there
+  bool slurm = false;                   ///< whether decompositions run on a cluster
   std::function<bool()> can_decompose;  ///< called on any thread
 };
 

@@ -5,6 +5,7 @@
 
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/escaped_text.h"
+#include "proto/cpp/utf8.h"
 #include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {
@@ -12,12 +13,10 @@ namespace {
 
 constexpr size_t kMostFigureBytes = 200;
 
-bool Continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80; }
-
 /// The last bytes of text, from the beginning of a character on.
 std::string_view Utf8Suffix(std::string_view text, size_t most_bytes) {
   if (text.size() > most_bytes) text.remove_prefix(text.size() - most_bytes);
-  while (!text.empty() && Continues(text.front())) text.remove_prefix(1);
+  while (!text.empty() && ContinuesCharacter(text.front())) text.remove_prefix(1);
   return text;
 }
 

@@ -13,9 +13,10 @@ absl::StatusOr<const SoundingObject*> Scene::Find(uint32_t handle) const {
   RETURN_IF_ERROR(CheckOpenLocked());
   const auto found = objects_.find(handle);
   if (found != objects_.end()) return &found->second;
-  return Refusal(
-      absl::StatusCode::kNotFound, "OBJECT_NOT_FOUND",
-      absl::StrCat(name_, " has no object ", handle, "; add it before its first contact or pose"));
+  return Refusal(absl::StatusCode::kNotFound, "OBJECT_NOT_FOUND",
+                 absl::StrCat(name_, " has no object ", handle,
+                              ", which is unknown or removed; add it before its first contact or "
+                              "pose, and send nothing for it after its removal"));
 }
 
 absl::StatusOr<const SoundingObject*> Scene::Move(uint32_t handle, const Pose& pose) {

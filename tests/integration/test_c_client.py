@@ -232,6 +232,17 @@ class CClientTest(DaemonTest):
         self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(samples, same.samples)
 
+    def test_a_step_whose_time_is_not_finite_or_goes_back_is_not_written(self):
+        file, trace = str(self.folder / "back.contacts"), ctypes.c_void_p()
+        self.assertEqual(self.c.carillon_create_trace(file.encode(), 1 / 60, 0, None, ctypes.byref(trace)), 0)
+        for time_s, code in ((1.0, 0), (float("nan"), 3), (0.5, 3), (2.0, 0)):
+            self.assertEqual(self.c.carillon_trace_step(trace, ctypes.byref(Step(time_s))), code)
+            if code:
+                refused = self.c.carillon_error()
+                self.assertRegex(refused, b"^INVALID_STREAM: .*(goes back .* at step 1|step 1 is nan); ")
+        self.assertEqual(self.c.carillon_close_trace(trace), 0)
+        self.assertEqual([step.time_s for step in carillon.Trace.read(file).steps], [1, 2])
+
     def test_a_placed_bar_is_heard_from_its_place(self):
         """The bar is 2 m to the right of the listener, who looks along -z from z = 1 m."""
         at = Vec3(2, 0, 1)

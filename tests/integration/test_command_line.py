@@ -66,8 +66,6 @@ class ListsTest(CommandLineTest):
         self.run_command("job", "cancel", "long\u202e")
         ended = self.daemon.command("job", "watch", "long\u202e", check=False)
         self.assertIn("JOB_CANCELLED", ended.stderr)
-        self.assertEqual(self.daemon.command("job", "cancel", "long\u202e").stderr, "")
-        self.assertIn("already succeeded", self.daemon.command("job", "cancel", "bar").stderr)
 
     def test_jobs_are_listed_and_watched_by_state_and_label(self):
         labels = [job["label"] for job in self.json_of("job", "list", "--state", "succeeded", "--label", "BAR")["jobs"]]
@@ -99,6 +97,7 @@ class ListsTest(CommandLineTest):
         self.assertEqual(told["fault_count"], sum(found["verdict"] == "FAULT" for found in told["findings"]))
         self.assertEqual(told["fault_count"], healthy.stdout.count("FAULT  "))
         self.assertIn({"subject": "tls", "verdict": "OK", "text": "not needed on this machine"}, told["findings"])
+        self.assertNotIn("slurm", healthy.stdout)  # this daemon has local workers
         nobody = carillon("--server", f"unix:{self.folder}/nobody", "doctor")
         self.assertEqual(nobody.returncode, 1)
         self.assertRegex(nobody.stdout, "FAULT  socket .* start carillond")

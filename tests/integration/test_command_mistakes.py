@@ -25,6 +25,17 @@ class MessagesTest(CommandLineTest):
             self.assertIn(expected, done.stderr)
 
 
+    def test_a_job_that_has_ended_cannot_be_cancelled(self):
+        self.run_command("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL, "--nodes", 60000,
+                         "--label", "long", "--no-wait")
+        self.run_command("job", "cancel", "long")
+        for job, expected in (("long", "been cancelled"), ("bar", "succeeded")):
+            again = self.daemon.command("--json", "job", "cancel", job, check=False)
+            self.assertEqual(again.returncode, 1)
+            self.assertRegex(again.stderr, f"^carillon: JOB_ENDED: jobs/.* has already {expected}, ")
+            self.assertIn(job, again.stdout)
+
+
 class RenderMistakesTest(CommandLineTest):
     def test_a_trace_without_contacts_is_refused(self):
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
@@ -127,6 +138,7 @@ class WrongValuesTest(unittest.TestCase):
                                 ((*create, "--memory-limit-mib", "-3"), "--memory-limit-mib"),
                                 (("transfer", "create", "bar", "--size", "0"), "--size"),
                                 (("listen", "--out", "x.ogg"), "must end with .wav"),
+                                (("listen", "--seconds", "0"), "leave --seconds out to record until the program"),
                                 (("model", "export", "bar", "--out", "x.obj"), "must end with .model, .glb"),
                                 (("example", "bar", "--out", "x.stl"), "must end with .obj"),
                                 (("--json", "listen"), "--json: stdout has the sound"),

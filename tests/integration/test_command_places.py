@@ -52,6 +52,14 @@ class SceneListenerTest(CommandLineTest):
         self.assertEqual(self.json_of("scene", "delete", scene), {"scene": scene})
 
 class StrikeJsonTest(CommandLineTest):
+    def test_json_has_the_warning_of_the_plain_output(self):
+        strike = ("strike", "bar", "--impulse", "0,0,-0.01", "--seconds", "0.01", "--point")
+        self.assertEqual(self.json_of(*strike, "0,0.008,0.01")["warnings"], [])
+        plain = self.daemon.command(*strike, "0,0,9").stderr
+        warning, = self.json_of(*strike, "0,0,9")["warnings"]
+        self.assertRegex(warning, r"^the point is [89]\S* m from the surface, and the strike sounds at the nearest ")
+        self.assertEqual(plain, f"warning: {warning}\n")
+
     def test_json_has_the_duration_and_the_peak_and_tells_of_the_limiter(self):
         strike = ("strike", "bar", "--point", "0,0.008,0.01", "--duration", "0.002", "--seconds", "0.01", "--impulse")
         shown, loud = (self.json_of(*strike, impulse) for impulse in ("0,0,-0.01", "0,0,-100"))

@@ -21,6 +21,8 @@ class MistakesTest(PackageTest):
             warnings.simplefilter("error", carillon.LabelWarning)
             self.c.create_model(BAR, meshes.MATERIAL, label="bar")
             self.c.create_model(BAR, meshes.MATERIAL)
+            # The daemon would cut this label of 201 bytes within its last letter, and would leave that letter out.
+            self.c.create_model(BAR, meshes.MATERIAL, label=199 * "x" + "ö")
 
     def test_a_stream_that_is_not_closed_is_told_at_the_end_of_the_program(self):
         script = ("import carillon, time\n"

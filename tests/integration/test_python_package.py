@@ -387,12 +387,6 @@ class ValuesTest(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "points has 2 rows and impulses has 1"):
             carillon.contacts.make_step(0, impulses=carillon.Impulses(1, [(0, 0, 0)] * 2, [(0, 0, 1)]))
 
-    def test_time_does_not_go_back_in_a_trace(self):
-        trace = carillon.Trace()
-        trace.step(1.0)
-        with self.assertRaisesRegex(ValueError, "goes back"):
-            trace.step(0.5)
-
 
 if __name__ == "__main__":
     unittest.main()

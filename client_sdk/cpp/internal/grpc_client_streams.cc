@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
@@ -60,6 +61,14 @@ class BlockReader {
   AudioBlock block_;
 };
 
+/// Errors: InvalidArgument (INVALID_SETTINGS: the callback is empty).
+template <class Callback>
+absl::Status CheckCallback(const Callback& callback, absl::string_view name) {
+  if (callback) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                 absl::StrCat(name, " is empty; give a function that takes what the daemon sends"));
+}
+
 using RenderCall = grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>;
 
 /// Sends the settings and the trace. An error of the trace cancels the call.
@@ -100,7 +109,9 @@ Rendering ReceiveSound(const AudioCallback& on_block, const BlowCallback& on_blo
   while (call.Read(&response)) {
     if (response.has_format()) reader.SetFormat(response.format());
     if (response.has_summary()) rendering.summary = response.summary();
-    for (const v1::Blow& blow : response.blows().blows()) on_blow(blow);
+    for (const v1::Blow& blow : response.blows().blows()) {
+      if (on_blow) on_blow(blow);
+    }
     if (response.has_block() && !rendering.stopped && !on_block(reader.Read(response.block(), 0))) {
       rendering.stopped = true;
       context.TryCancel();
@@ -152,6 +163,7 @@ absl::StatusOr<v1::Job> GrpcClient::WatchJob(
 absl::Status GrpcClient::WatchJobs(
     const v1::WatchJobsRequest& request,
     const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const {
+  RETURN_IF_ERROR(CheckCallback(on_answer, "on_answer"));
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   const auto reader = stubs_->decompositions.WatchJobs(&context, request);
@@ -170,6 +182,7 @@ absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
 absl::Status GrpcClient::RecordContacts(
     const std::string& scene, const std::function<void()>& on_begun,
     const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const {
+  RETURN_IF_ERROR(CheckCallback(on_record, "on_record"));
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   v1::RecordContactsRequest request;
@@ -191,6 +204,7 @@ absl::Status GrpcClient::RecordContacts(
 
 absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
                                   const AudioCallback& on_block) const {
+  RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   const auto stream = stubs_->audio.Listen(&context, request);
@@ -210,13 +224,14 @@ absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
 absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
                                                      ContactTraceReader& trace,
                                                      const AudioCallback& on_block) const {
-  return Render(settings, trace, on_block, [](const v1::Blow&) {});
+  return Render(settings, trace, on_block, nullptr);
 }
 
 absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
                                                      ContactTraceReader& trace,
                                                      const AudioCallback& on_block,
                                                      const BlowCallback& on_blow) const {
+  RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   const auto call = stubs_->audio.Render(&context);

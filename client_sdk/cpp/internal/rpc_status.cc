@@ -50,6 +50,14 @@ absl::Status FromRpc(const grpc::Status& status, const std::string& server) {
     return Refusal(code, "SERVER_TIMEOUT",
                    absl::StrCat(server, " took too long to answer; try again later"));
   }
+  if (code == absl::StatusCode::kResourceExhausted &&
+      absl::StartsWith(status.error_message(), "Received message larger than max")) {
+    return Refusal(code, "MESSAGE_TOO_LARGE",
+                   absl::StrCat("the daemon at ", server,
+                                " refuses the size of a message: ", status.error_message(),
+                                "; report fewer points in a step, or ask for less in one "
+                                "call"));
+  }
   // gRPC ends a call so if the daemon cannot parse its request.
   if (code == absl::StatusCode::kUnimplemented && status.error_message().empty()) {
     return Refusal(code, "REQUEST_MALFORMED",

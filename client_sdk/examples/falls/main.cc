@@ -73,7 +73,9 @@ absl::Status Record(const Options& options) {
   }
   const int step_count =
       static_cast<int>(options.seconds.value_or(scene.seconds) * options.rate_hz);
-  for (int i = 0; i < step_count; ++i) trace.Write(simulation());
+  for (int i = 0; i < step_count; ++i) {
+    RETURN_IF_ERROR(trace.Write(simulation()));
+  }
   return trace.Close();
 }
 

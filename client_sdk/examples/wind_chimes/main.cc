@@ -148,7 +148,9 @@ absl::Status Play(const PlayOptions& options) {
   for (int i = 0; i < step_count; ++i) {
     const v1::ContactStep step = chimes();
     contact_count += step.contacts_size();
-    if (trace) trace->Write(step);
+    if (trace) {
+      RETURN_IF_ERROR(trace->Write(step));
+    }
     if (!live) continue;
     // The simulation of a step takes less time than the step, so the loop waits for real time.
     std::this_thread::sleep_until(start + i * std::chrono::duration<double>(kStep_s));

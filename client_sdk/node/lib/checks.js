@@ -117,6 +117,14 @@ function choice(given, words, prefix, name) {
   return prefix + word.toUpperCase();
 }
 
+/** Throws a TypeError if one of the values, by their names, is given and is no number. */
+function refuseNoNumbers(values, where) {
+  for (const [name, value] of Object.entries(values)) {
+    const isAbsent = value === undefined || value === null;
+    if (!isAbsent && typeof value !== 'number') refuse(value, `${name} of ${where}`, 'a number');
+  }
+}
+
 /** Throws a TypeError unless the values are `count` numbers. Returns them. */
 function tuple(values, count, name, meaning) {
   const isTuple = values !== null && typeof values === 'object' && values.length === count;
@@ -124,4 +132,4 @@ function tuple(values, count, name, meaning) {
   return values;
 }
 
-module.exports = { choice, counted, nearest, refuse, refuseNoMessage, refuseUnknown, tuple, whole };
+module.exports = { choice, counted, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole };

@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { defaultServer } = require('./address');
-const { choice, nearest, refuse, refuseNoMessage, refuseUnknown } = require('./checks');
+const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
@@ -185,7 +185,9 @@ class Client {
 
   /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
   async model(text, material) {
-    if (typeof text !== 'string') refuse(text, 'the model', 'its label, its name, or the first digits of its digest');
+    if (typeof text !== 'string' || !text.replace(MODELS, '')) {
+      refuse(text, 'the model', 'its label, its name, or the first digits of its digest');
+    }
     const name = text.startsWith(MODELS) ? text : await this.find(text);
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
     return new Model(this, answer.modal_model, material ?? answer.modal_model.material ?? undefined);
@@ -207,7 +209,7 @@ class Client {
     const names = [];
     const labels = [];
     for await (const { name, label } of this.models()) {
-      if (label === text || (text && name.slice(MODELS.length).startsWith(text))) names.push(name);
+      if (label === text || name.slice(MODELS.length).startsWith(text)) names.push(name);
       if (label) labels.push(label);
     }
     if (names.length === 1) return names[0];
@@ -224,6 +226,7 @@ class Client {
   setVolume(volume) {
     refuseUnknown(volume, ['gain', 'muted'], 'setVolume');
     const { gain, muted } = volume;
+    refuseNoNumbers({ gain }, 'setVolume');
     return this.call('AudioService', 'UpdateMixer', { ...given('gain', gain), ...given('muted', muted) });
   }
 
@@ -240,6 +243,7 @@ class Client {
     refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene', 'CreateSceneRequest');
     const { hearing, listener, gain, keep = false, id } = settings;
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
+    refuseNoNumbers({ gain }, 'createScene');
     const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),
       ...given('gain', gain), keep, ...given('id', id) };
     const made = await this.call('SceneService', 'CreateScene', request);

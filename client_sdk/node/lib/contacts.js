@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-const { counted, refuse, refuseNoMessage, refuseUnknown, tuple, whole } = require('./checks');
+const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole } = require('./checks');
 const { SCENE_FRAME } = require('./warnings');
 
 // What the arguments mean, for messages.
@@ -157,6 +157,8 @@ function impulseColumns(columns, keys = IMPULSE_KEYS, where = 'impulses') {
 
 function contactColumns(columns) {
   const impulses = impulseColumns(columns, CONTACT_KEYS, 'contacts');
+  const { roughnessDepth, irregularityLength } = columns;
+  refuseNoNumbers({ roughnessDepth, irregularityLength }, 'contacts');
   const count = impulses.object.length;
   const made = { impulses };
   if (columns.partners !== undefined) {
@@ -166,7 +168,7 @@ function contactColumns(columns) {
     made.travel_speed_m_per_s = numbers(columns.travelSpeeds, count, 'travelSpeeds');
   }
   return { ...made,
-    ...present({ depth: columns.roughnessDepth, irregularity_length_m: columns.irregularityLength }) };
+    ...present({ depth: roughnessDepth, irregularity_length_m: irregularityLength }) };
 }
 
 function secondObject(second, where) {
@@ -185,6 +187,7 @@ function toRoughness(roughness, where) {
 /** What rows of impulses and of contacts have in common. */
 function impulseRow(row, where, keys = IMPULSE_ROW_KEYS) {
   refuseUnknown(row, keys, where);
+  refuseNoNumbers({ timeOffset: row.timeOffset }, where);
   return { ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset }),
     point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
     impulse_newton_seconds: vector(row.impulse, `impulse of ${where}`, MEANINGS.impulses),

@@ -5,6 +5,8 @@ const grpc = require('@grpc/grpc-js');
 const { message } = require('./contract');
 
 const DETAILS_KEY = 'grpc-status-details-bin';
+// How gRPC ends a call whose message has more bytes than the daemon takes.
+const TOO_LARGE = /^Received message larger than max \((\d+) vs\.? (\d+)\)/;
 
 /**
  * A refusal. `reason` is stable and one of proto/README.md's; `message` says what was wrong, where, and how to repair
@@ -74,6 +76,11 @@ function fromCall(error, server) {
     const details = error.details.replace(/\.? Resolution note: $/, '');
     return new ServerUnavailable('SERVER_UNAVAILABLE', `no daemon answers at ${server}: ${details}; start carillond, ` +
       'or give the address where it listens');
+  }
+  const tooLarge = TOO_LARGE.exec(error.details);
+  if (tooLarge) {
+    return new CarillonError('MESSAGE_TOO_LARGE', `a message of ${tooLarge[1]} bytes: the daemon takes at most ` +
+      `${tooLarge[2]}; report fewer points in a step, or ask for less in one call`);
   }
   return new CarillonError(grpc.status[error.code], error.details);
 }

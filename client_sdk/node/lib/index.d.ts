@@ -184,7 +184,7 @@ export class Trace {
   steps: ContactStep[];
   /** Adds an object, which is there from the beginning. Returns its handle. */
   add(model: Model | string, settings?: ObjectSettings & { label?: string }): number;
-  /** Adds a step. Times must not go back. */
+  /** Adds a step. Throws CarillonError (INVALID_STREAM) if the time is not finite or goes back. */
   step(time: number, content?: StepContent): void;
   records(): Generator<ContactTraceRecord>;
   bytes(): Buffer;

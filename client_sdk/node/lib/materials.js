@@ -19,7 +19,7 @@ function toMaterial(material) {
  */
 function named(model, material) {
   const name = typeof model === 'string' ? model : model?.name;
-  if (typeof name !== 'string') refuse(model, 'the model', 'a Model, such as await createModel(...), or its name');
+  if (typeof name !== 'string' || !name) refuse(model, 'the model', 'a Model, such as await createModel(...), or its name');
   const chosen = material ?? (typeof model === 'string' ? undefined : model.material);
   return chosen === undefined ? { modal_model: name } : { modal_model: name, material: toMaterial(chosen) };
 }

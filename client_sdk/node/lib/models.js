@@ -2,7 +2,7 @@
 'use strict';
 
 const util = require('util');
-const { counted, refuseUnknown } = require('./checks');
+const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { strikeOf } = require('./contacts');
 const { inNames } = require('./errors');
 const { Trace } = require('./traces');
@@ -39,6 +39,7 @@ class Model {
   async waitForTransfer(options = {}) {
     refuseUnknown(options, ['timeout', 'onProgress'], 'waitForTransfer');
     const { timeout, onProgress } = options;
+    refuseNoNumbers({ timeout }, 'waitForTransfer');
     const end = timeout === undefined ? undefined : Date.now() + 1000 * timeout;
     for (const job of await this.transferJobs()) {
       const rest = end === undefined ? undefined : Math.max(0, end - Date.now()) / 1000;
@@ -69,6 +70,7 @@ class Model {
     refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker', 'material', 'size', 'gain', 'seconds',
       'sampleRateHz'], 'renderStrike');
     const { material, size, gain, seconds = 0, sampleRateHz = 48000 } = strike;
+    refuseNoNumbers({ size, gain, seconds, sampleRateHz }, 'renderStrike');
     const trace = new Trace({ simulator: 'carillon (Node)' });
     const object = trace.add(this, { material, size, gain });
     trace.step(0, { impulses: strikeOf(object, strike) });

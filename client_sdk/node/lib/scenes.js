@@ -2,7 +2,7 @@
 'use strict';
 
 const util = require('util');
-const { counted, refuseUnknown } = require('./checks');
+const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
@@ -43,6 +43,7 @@ class SoundingObject {
   async update(changes) {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
     const { material, size, gain, pose, glide = 0, radiation } = changes;
+    refuseNoNumbers({ size, gain, glide }, 'update');
     const request = { name: this.name, glide_s: glide, ...given('material', material && toMaterial(material)),
       ...given('size', size), ...given('gain', gain), ...given('pose', toPose(pose)),
       ...present({ radiation: toRadiation(radiation) }) };
@@ -87,6 +88,7 @@ class Scene {
   request(object, where) {
     refuseUnknown(object, ['model', ...OBJECT_KEYS, 'handle'], where);
     const { model, material, size, gain, pose, handle, radiation } = object;
+    refuseNoNumbers({ size, gain }, where);
     return { scene: this.name, ...named(model, material), ...present({ size, handle: toHandle(handle) }),
       ...given('gain', gain), ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
@@ -110,6 +112,7 @@ class Scene {
   async update(volume) {
     refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');
     const { gain, muted, solo } = volume;
+    refuseNoNumbers({ gain }, 'update');
     const request = { name: this.name, ...given('gain', gain), ...given('muted', muted), ...given('solo', solo) };
     return (await this.client.call('SceneService', 'UpdateScene', request)).scene;
   }
@@ -126,6 +129,7 @@ class Scene {
 
   /** Moves the listener, within `glide` seconds. */
   async moveListener(pose, glide = 0) {
+    refuseNoNumbers({ glide }, 'moveListener');
     await this.client.call('SceneService', 'UpdateListener', { scene: this.name, pose: toPose(pose), glide_s: glide });
   }
 
@@ -133,6 +137,7 @@ class Scene {
   stream(own = {}) {
     refuseUnknown(own, ['step', 'delay', 'frame', 'pulseShape'], 'stream');
     const { step, delay, ...settings } = own;
+    refuseNoNumbers({ step, delay }, 'stream');
     return new ContactStream(this, { scene: this.name, step_s: step, ...given('scheduling_delay_s', delay),
       ...streamSettings(settings) });
   }

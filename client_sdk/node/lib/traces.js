@@ -3,7 +3,7 @@
 
 const fs = require('fs/promises');
 const util = require('util');
-const { choice, counted, refuseNoMessage, refuseUnknown } = require('./checks');
+const { choice, counted, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { given, makeStep, objectsOf, present, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
@@ -26,6 +26,7 @@ class Trace {
   constructor(own = {}) {
     refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape'], 'Trace');
     const { step, simulator, hearing, listener, ...settings } = own;
+    refuseNoNumbers({ step }, 'Trace');
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
     this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step }),
       ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')), ...streamSettings(settings) };
@@ -37,18 +38,18 @@ class Trace {
   add(model, settings = {}) {
     refuseUnknown(settings, ['material', 'size', 'gain', 'pose', 'label', 'handle', 'radiation'], 'add');
     const { material, size = 1, gain = 1, pose, label, handle, radiation } = settings;
+    refuseNoNumbers({ size, gain }, 'add');
     const own = toHandle(handle) || 1 + this.objects.reduce((most, object) => Math.max(most, object.handle), 0);
     this.objects.push({ handle: own, ...named(model, material), size, gain, ...present({ label }),
       ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) });
     return own;
   }
 
-  /** Adds a step, as ContactStream.step sends one. Times must not go back. */
+  /**
+   * Adds a step, as ContactStream.step sends one. Throws CarillonError (INVALID_STREAM) and adds nothing if the time is
+   * not finite or goes back.
+   */
   step(time, content) {
-    const last = this.steps.at(-1)?.time_s ?? 0;
-    if (this.steps.length && time < last) {
-      throw new RangeError(`time goes back from ${last} to ${time} s; add the steps in order`);
-    }
     if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
       throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
         'stream: new Trace({ step: 1 / 240 })');
@@ -60,7 +61,23 @@ class Trace {
           'returned');
       }
     }
-    this.steps.push(makeStep(time, content));
+    const made = makeStep(time, content);
+    this.refuseTime(time);
+    this.steps.push(made);
+  }
+
+  /** Throws CarillonError (INVALID_STREAM) if no step can have the time after the last one. */
+  refuseTime(time) {
+    const number = this.steps.length;
+    if (!Number.isFinite(time)) {
+      throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
+        'seconds');
+    }
+    const last = this.steps.at(-1)?.time_s ?? 0;
+    if (number && time < last) {
+      throw new CarillonError('INVALID_STREAM', `time goes back from ${last} s to ${time} s at step ${number}; make ` +
+        'another trace for another run');
+    }
   }
 
   /** The header, the objects, then the steps, each a ContactTraceRecord. */

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -126,6 +127,9 @@ TEST(OtherLabel, SaysThatAModelKeepsItsLabel) {
               HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' does not name"));
   EXPECT_EQ(OtherLabel(model, "key_maple"), "");
   EXPECT_EQ(OtherLabel(model, std::string(201, 'x')), "");
+  // The daemon would cut the second label within a letter, and leaves that letter out.
+  EXPECT_NE(OtherLabel(model, absl::StrCat(std::string(198, 'x'), "ö")), "");
+  EXPECT_EQ(OtherLabel(model, absl::StrCat(std::string(199, 'x'), "ö")), "");
 }
 
 TEST(SharedLabel, SaysHowToNameEachModelOfALabel) {

@@ -6,6 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
 namespace carillon::client {
 namespace {
 
@@ -24,6 +28,23 @@ TEST_F(ClientWithoutDaemon, IsToldSoByEveryKindOfCall) {
   EXPECT_THAT(client_->WatchJob("jobs/a", nullptr).status().ToString(), unavailable);
   EXPECT_THAT(client_->Listen([](const AudioBlock&) { return true; }).ToString(), unavailable);
   EXPECT_THAT(client_->StreamContacts({}).status().ToString(), unavailable);
+}
+
+TEST_F(ClientWithoutDaemon, RefusesAnEmptyCallbackInsteadOfCallingIt) {
+  const std::string path = testing::TempDir() + "empty_callback.contacts";
+  auto writer = ContactTraceWriter::Create(path, {});
+  ASSERT_TRUE(writer.ok() && writer->Close().ok());
+  auto trace = ContactTraceReader::Open(path);
+  ASSERT_TRUE(trace.ok()) << trace.status();
+  const auto refused = [](const char* name) {
+    return HasSubstr(absl::StrCat("INVALID_SETTINGS: ", name, " is empty; "));
+  };
+  EXPECT_THAT(client_->Render({}, *trace, AudioCallback()).status().ToString(),
+              refused("on_block"));
+  EXPECT_THAT(client_->Listen(nullptr).ToString(), refused("on_block"));
+  EXPECT_THAT(client_->RecordContacts("scenes/1", nullptr, nullptr).ToString(),
+              refused("on_record"));
+  EXPECT_THAT(client_->WatchJobs({}, nullptr).ToString(), refused("on_answer"));
 }
 
 }  // namespace

@@ -4,9 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <vector>
 
 namespace carillon::client {
@@ -33,7 +35,7 @@ class ContactTrace : public testing::Test {
     step.set_time_s(0.25);
     // More than 127 bytes, so that its length takes two.
     for (int i = 0; i < 20; ++i) step.add_impulses()->set_object(7);
-    writer->Write(step);
+    ASSERT_TRUE(writer->Write(step).ok());
     ASSERT_TRUE(writer->Close().ok());
   }
 
@@ -121,6 +123,34 @@ TEST_F(ContactTrace, SaysWhereNoFileIs) {
   EXPECT_THAT(ReadAll().ToString(), HasSubstr("FILE_NOT_FOUND: "));
   EXPECT_THAT(ContactTraceWriter::Create("/proc/no/such/folder", {}).status().ToString(),
               HasSubstr("OUTPUT_NOT_WRITABLE: "));
+}
+
+TEST_F(ContactTrace, RefusesAStepWhoseTimeIsNotFiniteOrGoesBack) {
+  auto writer = ContactTraceWriter::Create(path_, {});
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  const auto write = [&](double time_s) {
+    v1::ContactStep step;
+    step.set_time_s(time_s);
+    return writer->Write(step).ToString();
+  };
+  for (const double time_s : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THAT(write(time_s), HasSubstr("INVALID_STREAM: "));
+  }
+  // A simulation may begin at a time below zero, and two steps may have the same time.
+  for (const double time_s : {-1.0, 2.0, 2.0}) EXPECT_EQ(write(time_s), "OK");
+  EXPECT_THAT(write(1.5), AllOf(HasSubstr("INVALID_STREAM: "),
+                                HasSubstr("time goes back from 2 s to 1.5 s at step 3;")));
+  EXPECT_EQ(write(3), "OK");
+  ASSERT_TRUE(writer->Close().ok());
+  auto reader = ContactTraceReader::Open(path_);
+  ASSERT_TRUE(reader.ok()) << reader.status();
+  for (const double time_s : {-1.0, 2.0, 2.0, 3.0}) {
+    const auto record = reader->Next();
+    ASSERT_TRUE(record.ok() && *record);
+    EXPECT_EQ((*record)->step().time_s(), time_s);
+  }
+  const auto end = reader->Next();
+  EXPECT_TRUE(end.ok() && !*end);
 }
 
 TEST_F(ContactTrace, SaysThatTheDiskIsFull) {

@@ -46,6 +46,15 @@ TEST(RpcStatus, NamesTheServerThatDoesNotAnswer) {
   EXPECT_THAT(status.ToString(), HasSubstr("unix:/run/c.sock"));
 }
 
+TEST(RpcStatus, TellsHowToRepairAMessageThatIsTooLarge) {
+  const absl::Status status =
+      FromRpc(grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED,
+                           "Received message larger than max (2500022 vs. 2097152)"),
+              "unix:/x");
+  EXPECT_EQ(ToErrorInfo(status).reason(), "MESSAGE_TOO_LARGE");
+  EXPECT_THAT(status.ToString(), HasSubstr("report fewer points in a step"));
+}
+
 TEST(RpcStatus, IsOkWhereTheCallWas) { EXPECT_TRUE(FromRpc(grpc::Status::OK, "x").ok()); }
 
 }  // namespace

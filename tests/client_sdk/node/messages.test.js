@@ -6,10 +6,11 @@ const assert = require('node:assert/strict');
 const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
-const { fromInfo } = require('carillon/lib/errors');
+const { Metadata } = require('@grpc/grpc-js');
+const { fromCall, fromInfo } = require('carillon/lib/errors');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
-const { warnOfContacts, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
+const { warnOfContacts, warnOfLabel, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
@@ -237,6 +238,66 @@ test('a trace of contacts needs the length of its steps, as a stream does', () =
   assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);
   new carillon.Trace().step(0, { impulses: contacts });
   new carillon.Trace({ step: 1 / 240 }).step(0, { contacts });
+});
+
+test('a step whose time is not finite or goes back is refused, and the trace can be continued', () => {
+  const trace = new carillon.Trace();
+  for (const time of [NaN, Infinity]) {
+    assert.throws(() => trace.step(time), { name: 'CarillonError', reason: 'INVALID_STREAM' });
+  }
+  trace.step(-1);
+  trace.step(2);
+  assert.throws(() => trace.step(1.5), { reason: 'INVALID_STREAM', message: /goes back from 2 s to 1\.5 s at step 2;/ });
+  trace.step(2);
+  assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
+});
+
+test('an empty name of a model is refused with the name of the argument', async () => {
+  for (const text of ['', 'modalModels/', 3]) {
+    await assert.rejects(c.model(text), { name: 'TypeError',
+      message: `the model is ${inspect(text)}; it must be its label, its name, or the first digits of its digest` });
+  }
+  await assert.rejects(scene.add(''), /^TypeError: the model is ''; it must be a Model/);
+  assert.throws(() => new carillon.Trace().add(''), /^TypeError: the model is ''; it must be a Model/);
+});
+
+test('text in place of a number is refused with the name of the field', async () => {
+  const refusedText = async (name, call) => assert.rejects(async () => call(), { name: 'TypeError',
+    message: `${name} is '0.5'; it must be a number` });
+  const text = '0.5';
+  const row = { object: 1, point: POINT, impulse: IMPULSE };
+  const trace = new carillon.Trace({ step: 1 / 240 });
+  for (const [name, call] of [
+    ['gain of add', () => scene.add('modalModels/1', { gain: text })],
+    ['size of object 0 of addAll', () => scene.addAll([{ model: 'modalModels/1', size: text }])],
+    ['gain of add', () => trace.add('modalModels/1', { gain: text })],
+    ['gain of update', () => bell.update({ gain: text })], ['glide of update', () => bell.update({ glide: text })],
+    ['gain of update', () => scene.update({ gain: text })], ['gain of setVolume', () => c.setVolume({ gain: text })],
+    ['gain of createScene', () => c.createScene({ gain: text })],
+    ['glide of moveListener', () => scene.moveListener(POINT, text)],
+    ['step of stream', () => scene.stream({ step: text })],
+    ['delay of stream', () => scene.stream({ step: 0.01, delay: text })],
+    ['step of Trace', () => new carillon.Trace({ step: text })],
+    ['timeOffset of impulses[0]', () => trace.step(0, { impulses: [{ ...row, timeOffset: text }] })],
+    ['roughnessDepth of contacts', () => trace.step(0, { contacts: { objects: 1, points: POINT, impulses: IMPULSE,
+      roughnessDepth: text } })],
+    ['seconds of renderStrike', () => new carillon.Model(c, { name: 'modalModels/1' }).renderStrike({ point: POINT,
+      impulse: IMPULSE, seconds: text })],
+  ]) await refusedText(name, call);
+  assert.equal(trace.objects.length + trace.steps.length, 0);
+});
+
+test('a label that the daemon would cut within a letter is not told as another one', async () => {
+  const longest = `${'x'.repeat(198)}ö`; // 200 bytes
+  const toldOf = (wanted) => warningsOf(() => warnOfLabel('bell', wanted));
+  assert.equal((await toldOf(longest)).length, 1);
+  assert.deepEqual(await toldOf(`x${longest}`), []);
+});
+
+test('a message that is too large tells how to repair it', () => {
+  const error = { code: 8, details: 'Received message larger than max (2500022 vs. 2097152)', metadata: new Metadata() };
+  assert.equal(fromCall(error, 'unix:/nowhere').message, 'MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon ' +
+    'takes at most 2097152; report fewer points in a step, or ask for less in one call');
 });
 
 test('refusals of the daemon have the names of the caller', () => {

@@ -234,6 +234,44 @@ class RefusalsTest(MessagesTest):
         carillon.Trace().step(0, impulses=impulses)
         carillon.Trace(step=1 / 240).step(0, contacts=contacts)
 
+    def test_a_step_whose_time_is_not_finite_or_goes_back_is_refused_and_the_trace_can_be_continued(self):
+        trace = carillon.Trace()
+
+        def refused(expected, time):
+            with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:
+                trace.step(time)
+            self.assertEqual(raised.exception.reason, "INVALID_STREAM")
+
+        for time in (numpy.nan, numpy.inf):
+            refused("the time of step 0 is", time)
+        trace.step(-1)
+        trace.step(2)
+        refused(r"time goes back from 2 s to 1\.5 s at step 2;", 1.5)
+        trace.step(2)
+        self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
+
+    def test_an_empty_name_of_a_model_is_refused_with_the_name_of_the_argument(self):
+        for text in ("", "modalModels/", None):
+            self.refused(f"the model is {text!r}; it must be its label, its name, or the first digits of its digest",
+                         self.c.model, text)
+        for add in (carillon.Scene(self.c, "scenes/1").add, carillon.Trace().add):
+            self.refused("the model is ''; it must be a Model, or its name", add, "", "oak")
+
+    def test_a_message_that_is_too_large_tells_how_to_repair_it(self):
+        class TooLarge(grpc.RpcError):
+            def trailing_metadata(self):
+                return ()
+
+            def code(self):
+                return grpc.StatusCode.RESOURCE_EXHAUSTED
+
+            def details(self):
+                return "Received message larger than max (2500022 vs. 2097152)"
+
+        self.assertEqual(str(carillon.errors.from_rpc(TooLarge(), "unix:/nowhere")),
+                         "MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon takes at most 2097152; report "
+                         "fewer points in a step, or ask for less in one call")
+
     def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
         for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
                                ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),

@@ -101,10 +101,11 @@ absl::Status WriteTrace(const std::string& model, const std::string& file) {
   absl::StatusOr<ContactTraceWriter> trace = ContactTraceWriter::Create(file, MakeHeader());
   if (!trace.ok()) return trace.status();
   WriteBars(model, *trace);
-  trace->Write(Knock());
-  for (int number = 1; number <= 16; ++number) trace->Write(Slide(number));
-  trace->Write(Collision());
-  return trace->Close();
+  absl::Status written = trace->Write(Knock());
+  for (int number = 1; number <= 16; ++number) written.Update(trace->Write(Slide(number)));
+  written.Update(trace->Write(Collision()));
+  written.Update(trace->Close());
+  return written;
 }
 
 absl::Status Render(const std::string& server, const std::string& trace_file,

@@ -75,8 +75,21 @@ TEST_F(ServerInfoApi, FeaturesAreWordsInAlphabeticalOrder) {
   const v1::GetServerInfoResponse answer = InfoFrom(*info);
   const std::vector<std::string> features(answer.features().begin(), answer.features().end());
   EXPECT_THAT(features, testing::Contains("decomposition"));
+  EXPECT_THAT(features, testing::Not(testing::Contains("slurm")));
   EXPECT_THAT(features, testing::Not(testing::Contains("transfers")));
   EXPECT_TRUE(std::ranges::is_sorted(features));
+}
+
+/// A daemon whose decompositions run on a cluster.
+class ClusterInfoApi : public ServedDaemon {
+ protected:
+  ClusterInfoApi() : ServedDaemon({.slurm = true}) {}
+};
+
+TEST_F(ClusterInfoApi, SlurmIsAFeature) {
+  const v1::GetServerInfoResponse answer = InfoFrom(*info);
+  EXPECT_THAT(answer.features(), testing::Contains("slurm"));
+  EXPECT_TRUE(std::ranges::is_sorted(answer.features()));
 }
 
 /// A daemon on TCP that nobody may use without a token.

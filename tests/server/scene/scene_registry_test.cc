@@ -193,7 +193,8 @@ TEST(SceneRegistry, WhatIsNotThereIsNotFound) {
          "SCENE_NOT_FOUND: ");
   expect(stage.scenes.OpenContactStream(999, {.step_s = 0.01}).status(), "SCENE_NOT_FOUND: ");
   expect(stage.scenes.RemoveObject(stage.scene, 7), "OBJECT_NOT_FOUND: ");
-  expect(stage.scenes.UpdateObject(stage.scene, 7, {}).status(), "OBJECT_NOT_FOUND: ");
+  expect(stage.scenes.UpdateObject(stage.scene, 7, {}).status(),
+         "has no object 7, which is unknown or removed; ");
 }
 
 TEST(SceneRegistry, TheNumberOfScenesIsLimited) {

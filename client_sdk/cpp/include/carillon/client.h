@@ -44,7 +44,9 @@ struct JobRun {
 /// stream and no file can return DEADLINE_EXCEEDED (SERVER_TIMEOUT) after 60 seconds.
 ///
 /// Threads: any number of threads may call the methods of one client at the same time. A call
-/// blocks its thread until the daemon has answered. Callbacks run on the calling thread.
+/// blocks its thread until the daemon has answered. Callbacks run on the calling thread. A call
+/// that streams sound, contacts or jobs refuses an empty callback with INVALID_ARGUMENT
+/// (INVALID_SETTINGS), unless the callback may be null.
 class Client {
  public:
   virtual ~Client() = default;
@@ -227,8 +229,8 @@ class Client {
                                                    ContactTraceReader& trace,
                                                    const AudioCallback& on_block) const;
 
-  /// Renders as above. After the sound, passes each impulse that sounded to `on_blow`, if
-  /// `settings.tell_blows()` is true.
+  /// Renders as above. After the sound, passes each impulse that sounded to `on_blow`, which may be
+  /// null, if `settings.tell_blows()` is true.
   virtual absl::StatusOr<v1::RenderSummary> Render(
       const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
       const std::function<void(const v1::Blow&)>& on_blow) const;

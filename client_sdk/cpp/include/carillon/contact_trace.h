@@ -29,18 +29,22 @@ class ContactTraceWriter {
   void Write(const v1::ContactTraceObject& object);
 
   /// Appends a simulation step. Steps must be written in the order of their times. Close() reports
-  /// an error of the file.
-  void Write(const v1::ContactStep& step);
+  /// an error of the file. Errors: INVALID_ARGUMENT (INVALID_STREAM) if the step's time is not
+  /// finite or goes back; the step is not written then, and the trace can be continued.
+  absl::Status Write(const v1::ContactStep& step);
 
   /// Completes the file. Errors: INTERNAL (OUTPUT_NOT_WRITABLE) if any write has failed.
   absl::Status Close();
 
  private:
   ContactTraceWriter(std::string path, std::ofstream file);
+  absl::Status CheckTime(double time_s) const;
   void WriteRecord(const v1::ContactTraceRecord& record);
 
   std::string path_;
   std::ofstream file_;
+  uint64_t step_count_ = 0;
+  double time_s_ = 0;  ///< of the last step
 };
 
 /// Reads a contact trace record by record. One thread at a time may use a reader.

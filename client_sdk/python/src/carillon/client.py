@@ -116,6 +116,8 @@ class Client:
 
     def model(self, text: str, material: Optional[Material] = None) -> Model:
         """Returns the model that the text means: a name, a label, or the first digits of a digest."""
+        if not isinstance(text, str) or not text.removeprefix("modalModels/"):
+            checks.refuse(text, "the model", "its label, its name, or the first digits of its digest")
         name = text if text.startswith("modalModels/") else self._find(text).name
         with errors.translated(self.server):
             answer = self.models_stub.GetModalModel(modal_model_service_pb2.GetModalModelRequest(name=name))
@@ -258,7 +260,7 @@ class Client:
     def _find(self, text: str) -> Model:
         models = list(self.models())
         found = [model for model in models
-                 if model.label == text or (text and model.name.removeprefix("modalModels/").startswith(text))]
+                 if model.label == text or model.name.removeprefix("modalModels/").startswith(text)]
         if len(found) == 1:
             return found[0]
         if found:

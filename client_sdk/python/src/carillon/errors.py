@@ -18,6 +18,8 @@ SCENE_FRAME = "the scene's frame"
 # Time by which a simulation in real time may run ahead.
 USUAL_LEAD_S = 0.25
 DETAILS_KEY = "grpc-status-details-bin"
+# How gRPC ends a call whose message has more bytes than the daemon takes.
+TOO_LARGE = re.compile(r"Received message larger than max \((\d+) vs\.? (\d+)\)")
 # The caller's names of fields and calls of the contract that messages of the daemon mention.
 CALLER_NAMES = {"step_s": "step", "scheduling_delay_s": "delay", "glide_s": "glide",
                 r"columns(?=\[)": "impulses", r"contact_columns(?=\[)": "contacts", r"sustained(?=\[)": "forces",
@@ -183,6 +185,9 @@ def from_rpc(error: grpc.RpcError, server: str) -> CarillonError:
     if error.code() == grpc.StatusCode.UNAVAILABLE:
         return ServerUnavailable("SERVER_UNAVAILABLE", f"no daemon answers at {server}: {error.details()}; start "
                                  "carillond, or give the address where it listens")
+    if too_large := TOO_LARGE.match(error.details() or ""):
+        return CarillonError("MESSAGE_TOO_LARGE", f"a message of {too_large[1]} bytes: the daemon takes at most "
+                             f"{too_large[2]}; report fewer points in a step, or ask for less in one call")
     return CarillonError(error.code().name, error.details() or "")
 
 

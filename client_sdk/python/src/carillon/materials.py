@@ -57,6 +57,8 @@ def named(model: ModelLike | str, given: Optional[Material]) -> tuple[str, Optio
     """Returns the name of a model, and the material to sound with: the one given, or else the one that the model was
     asked for with. None leaves the choice to the daemon, which remembers it, too."""
     name = model if isinstance(model, str) else model.name
+    if not name:
+        checks.refuse(model, "the model", "a Model, or its name")
     chosen = given if given is not None or isinstance(model, str) else model.material
     return name, None if chosen is None else to_message(chosen)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Iterator
 from typing import Any, BinaryIO, Optional
@@ -47,16 +48,26 @@ class Trace:
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
-        """Adds a step, as ContactStream.step sends one. Times must not go back."""
-        if self.steps and time < self.steps[-1].time_s:
-            raise ValueError(f"time goes back from {self.steps[-1].time_s} to {time} s; add the steps in order")
+        """Adds a step, as ContactStream.step sends one. Raises CarillonError (INVALID_STREAM) and adds nothing if the
+        time is not finite or goes back."""
         if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
             raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
                              "stream: Trace(step=1/240)")
         for columns in (contacts, impulses, forces, poses):
             _refuse_objects_of_scenes(columns)
-        self.steps.append(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses,
-                                    listener=listener))
+        made = make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener)
+        self._check_time(made.time_s)
+        self.steps.append(made)
+
+    def _check_time(self, time: float) -> None:
+        """Raises CarillonError (INVALID_STREAM) if no step can have the time after the last one."""
+        number = len(self.steps)
+        if not math.isfinite(time):
+            raise CarillonError("INVALID_STREAM", f"the time of step {number} is {time}; give the simulation time in "
+                                "seconds")
+        if self.steps and time < self.steps[-1].time_s:
+            raise CarillonError("INVALID_STREAM", f"time goes back from {self.steps[-1].time_s:.6g} s to {time:.6g} s "
+                                f"at step {number}; make another trace for another run")
 
     def __repr__(self) -> str:
         return (f"<Trace: {checks.counted(len(self.objects), 'object')}, {checks.counted(len(self.steps), 'step')}, to "
