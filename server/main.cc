@@ -30,7 +30,7 @@
 #include "server/decomposition/local_executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
-#include "server/heap_keeper.h"
+#include "server/free_memory.h"
 #include "server/live_output/live_output.h"
 #include "server/memory_limits.h"
 #include "server/metrics/metrics_server.h"
@@ -220,13 +220,12 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
     rooms.server.ShowDatabaseHealth(files.ok());
     if (!files.ok()) spdlog::error("{}", std::string(files.message()));
   });
-  const HeapKeeper heap_keeper;
   LogOutput(rooms.output);
   guard.CompleteStart();
   AnnounceReady(rooms.server);
   std::optional<Watchdog> watchdog;
   if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
-  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, ReturnFreeMemory, LogInfo);
   ExpectEnd();
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");
