@@ -36,7 +36,6 @@
 #include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
-#include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
@@ -67,6 +66,8 @@ void AnnounceReady(const ApiServer& server) {
 
 void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
 
+void LogError(const std::string& line) { spdlog::error("{}", line); }
+
 void LogInfo(const std::string& line) { spdlog::info("{}", line); }
 
 void CollectUnusedMeshes(ModeDatabase& database) {
@@ -80,6 +81,14 @@ void LogMissingChanges(const Database& database) {
   if (const std::string missing = database.MissingChanges(); !missing.empty()) {
     spdlog::error("{}", missing);
   }
+}
+
+/// Logs which stored changes are missing, and removes what is not needed.
+void Tidy(ModeDatabase& database, const Options& options) {
+  database.models().KeepWithin(
+      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
+  LogMissingChanges(database.database());
+  CollectUnusedMeshes(database);
 }
 
 void LogOutput(const LiveOutput& output) {
@@ -216,10 +225,6 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
 absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
                    const StopGuard& guard) {
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
-  const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
-    rooms.server.ShowDatabaseHealth(files.ok());
-    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
-  });
   LogOutput(rooms.output);
   guard.CompleteStart();
   AnnounceReady(rooms.server);
@@ -243,10 +248,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
                    ModeDatabase::Open(directory.database_file(), clock));
-  database->models().KeepWithin(
-      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
-  LogMissingChanges(database->database());
-  CollectUnusedMeshes(*database);
+  Tidy(*database, options);
   RemoteRuns runs;
   ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
                    MakeQueue(options, directory, *database, clock, runs));
@@ -264,6 +266,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .output = *output,
                                                              .clock = clock,
                                                              .log = LogWarning,
+                                                             .log_error = LogError,
                                                              .can_decompose = [options] {
                                                                return CanDecompose(options);
                                                              }}));
