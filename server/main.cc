@@ -30,13 +30,12 @@
 #include "server/decomposition/local_executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
-#include "server/heap_keeper.h"
+#include "server/free_memory.h"
 #include "server/live_output/live_output.h"
 #include "server/memory_limits.h"
 #include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
-#include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
 #include "server/scene/scene_registry.h"
@@ -67,6 +66,8 @@ void AnnounceReady(const ApiServer& server) {
 
 void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
 
+void LogError(const std::string& line) { spdlog::error("{}", line); }
+
 void LogInfo(const std::string& line) { spdlog::info("{}", line); }
 
 void CollectUnusedMeshes(ModeDatabase& database) {
@@ -80,6 +81,14 @@ void LogMissingChanges(const Database& database) {
   if (const std::string missing = database.MissingChanges(); !missing.empty()) {
     spdlog::error("{}", missing);
   }
+}
+
+/// Logs which stored changes are missing, and removes what is not needed.
+void Tidy(ModeDatabase& database, const Options& options) {
+  database.models().KeepWithin(
+      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
+  LogMissingChanges(database.database());
+  CollectUnusedMeshes(database);
 }
 
 void LogOutput(const LiveOutput& output) {
@@ -217,17 +226,12 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
 absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
                    const StopGuard& guard) {
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
-  const DatabaseKeeper keeper(rooms.database.database(), [&rooms](const absl::Status& files) {
-    rooms.server.ShowDatabaseHealth(files.ok());
-    if (!files.ok()) spdlog::error("{}", std::string(files.message()));
-  });
-  const HeapKeeper heap_keeper;
   LogOutput(rooms.output);
   guard.CompleteStart();
   AnnounceReady(rooms.server);
   std::optional<Watchdog> watchdog;
   if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
-  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, ReturnFreeMemory, LogInfo);
   ExpectEnd();
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");
@@ -245,10 +249,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
                    ModeDatabase::Open(directory.database_file(), clock));
-  database->models().KeepWithin(
-      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
-  LogMissingChanges(database->database());
-  CollectUnusedMeshes(*database);
+  Tidy(*database, options);
   RemoteRuns runs;
   ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
                    MakeQueue(options, directory, *database, clock, runs));
@@ -266,6 +267,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .output = *output,
                                                              .clock = clock,
                                                              .log = LogWarning,
+                                                             .log_error = LogError,
                                                              .can_decompose = [options] {
                                                                return CanDecompose(options);
                                                              }}));

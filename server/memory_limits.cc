@@ -25,8 +25,8 @@
 namespace carillon {
 namespace {
 
-/// The daemon has 33 threads when it serves; gRPC begins more of them under load.
-constexpr size_t kThreadCount = 40;
+/// The daemon has 26 threads when it serves; gRPC begins some more of them under load.
+constexpr size_t kThreadCount = 32;
 /// Address space apart from stacks. A daemon that serves has 180 MiB, of which its program and
 /// libraries, which are there already, take 100 MiB.
 constexpr size_t kMemoryBytes = size_t{80} << 20U;

@@ -23,6 +23,7 @@ namespace {
 constexpr std::chrono::milliseconds kStopLimit(4500);
 constexpr std::chrono::milliseconds kForever(-1);
 constexpr timespec kReloadPeriod{.tv_sec = 1, .tv_nsec = 0};
+constexpr timespec kTidyPeriod{.tv_sec = 5, .tv_nsec = 0};
 
 sigset_t StopSignals() {
   sigset_t signals;
@@ -106,12 +107,14 @@ void StopGuard::EndNow(const std::string& line) const {
   std::_Exit(EXIT_SUCCESS);
 }
 
-void WaitForStop(const std::function<void()>& reload, const StopLog& log) {
+void WaitForStop(const std::function<void()>& reload, const std::function<void()>& tidy,
+                 const StopLog& log) {
   const sigset_t signals = ServedSignals();
   const sigset_t stops = StopSignals();
   int received = 0;
   while (received <= 0) {
-    if (sigwait(&signals, &received) != 0) received = 0;
+    received = sigtimedwait(&signals, nullptr, &kTidyPeriod);
+    if (received < 0) tidy();
     if (received != SIGHUP) continue;
     reload();
     received = sigtimedwait(&stops, nullptr, &kReloadPeriod);

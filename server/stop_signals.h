@@ -46,7 +46,8 @@ class StopGuard {
 };
 
 /// Returns on SIGINT and SIGTERM. SIGHUP calls `reload`, but at most once a second: signals that
-/// come sooner cause one call together.
-void WaitForStop(const std::function<void()>& reload, const StopLog& log);
+/// come sooner cause one call together. `tidy` is called every five seconds without a signal.
+void WaitForStop(const std::function<void()>& reload, const std::function<void()>& tidy,
+                 const StopLog& log);
 
 }  // namespace carillon

@@ -81,10 +81,10 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
   using Reactor = grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>;
-  return Open(*context, reception_, Role::kAdminister, Holding::kBackup,
+  return Open(*context, background_, Role::kAdminister, Holding::kBackup,
               [&](const Principal&, ClientPlace place) -> Reactor* {
                 return new BackupCall(
-                    *context, database_, reception_.pool,
+                    *context, database_, background_.pool,
                     {.place = std::move(place), .idle_calls = idle_calls_, .clock = clock_});
               });
 }

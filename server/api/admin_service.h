@@ -13,12 +13,14 @@ namespace carillon {
 /// service.
 class AdminService final : public v1::AdminService::CallbackService {
  public:
-  /// The pool of `writing` runs the calls that change the database.
+  /// The pool of `writing` runs the calls that change the database, and that of `background` makes
+  /// the backups.
   AdminService(ModeDatabase& database, const Reception& reception, const Reception& writing,
-               IdleCalls& idle_calls, const Clock& clock)
+               const Reception& background, IdleCalls& idle_calls, const Clock& clock)
       : database_(database),
         reception_(reception),
         writing_(writing),
+        background_(background),
         idle_calls_(idle_calls),
         clock_(clock) {}
 
@@ -35,6 +37,7 @@ class AdminService final : public v1::AdminService::CallbackService {
   ModeDatabase& database_;
   const Reception reception_;
   const Reception writing_;
+  const Reception background_;
   IdleCalls& idle_calls_;
   const Clock& clock_;
 };

@@ -18,12 +18,13 @@
 #include "server/api/admin_service.h"
 #include "server/api/audio_service.h"
 #include "server/api/certificate_end.h"
+#include "server/api/chore.h"
 #include "server/api/client_keeper.h"
 #include "server/api/client_limits.h"
 #include "server/api/connection_gate.h"
 #include "server/api/contact_service.h"
 #include "server/api/decomposition_service.h"
-#include "server/api/fair_pool.h"
+#include "server/api/fair_turns.h"
 #include "server/api/flood_guard.h"
 #include "server/api/grpc_log.h"
 #include "server/api/grpc_servers.h"
@@ -37,18 +38,26 @@
 #include "server/api/scene_service.h"
 #include "server/api/server_service.h"
 #include "server/api/thread_pool.h"
+#include "server/api/timetable.h"
 #include "server/api/tls_credentials.h"
+#include "server/mode_database/database_keeper.h"
 
 namespace carillon {
 namespace {
 
-constexpr int kCallThreadCount = 4;
+constexpr int kCallThreadCount = 3;
+/// Calls of AddObjects may occupy all call threads except one.
+constexpr int kAddingThreadCount = kCallThreadCount - 1;
 /// Calls that change the database wait for its write lock, which storing a large mesh holds for
-/// seconds. They have threads of their own, so that the other calls do not wait with them.
-constexpr int kWriteThreadCount = 2;
-/// Offline rendering has a lower priority than live sound.
-constexpr int kRenderThreadCount = 2;
-constexpr int kRenderNiceness = 10;
+/// seconds. They have a thread of their own, so that the other calls do not wait with them. With a
+/// second thread, two of these calls would wait for each other's lock.
+constexpr int kWriteThreadCount = 1;
+/// Offline renderings and backups have a lower priority than live sound.
+constexpr int kBackgroundThreadCount = 2;
+constexpr int kBackgroundNiceness = 10;
+
+constexpr std::chrono::milliseconds kClientPeriod(250);
+constexpr std::chrono::seconds kDatabasePeriod(1);
 
 std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -101,7 +110,15 @@ struct ApiServer::State {
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
         owners(access, leases, rooms.scenes),
-        admin(rooms.database, reception, writing, idle_calls, rooms.clock),
+        certificate_end(rooms.clock),
+        database_keeper(rooms.database.database(),
+                        [this](const absl::Status& files) { ShowDatabase(files); }),
+        client_keeper({.scenes = rooms.scenes,
+                       .owners = owners,
+                       .idle_calls = idle_calls,
+                       .idle_limit = Duration(settings.rendering_idle_s),
+                       .log = [this](const std::string& line) { client_log.Warn(line); }}),
+        admin(rooms.database, reception, writing, background, idle_calls, rooms.clock),
         models({.database = rooms.database,
                 .queue = rooms.decompositions,
                 .reception = reception,
@@ -111,7 +128,7 @@ struct ApiServer::State {
         decompositions(rooms.decompositions, reception, writing),
         job_runs(rooms.runs, access, call_pool),
         heads(settings.head_file),
-        scenes(rooms.scenes, owners, rooms.database, heads, reception),
+        scenes(rooms.scenes, owners, rooms.database, heads, reception, adding),
         contacts({.scenes = rooms.scenes,
                   .output = rooms.output,
                   .clock = rooms.clock,
@@ -126,8 +143,7 @@ struct ApiServer::State {
                .heads = heads,
                .clock = rooms.clock,
                .idle_calls = idle_calls,
-               .reception = {access, limits, render_pool}}),
-        certificate_end(rooms.clock),
+               .reception = background}),
         server_info({.version = settings.version,
                      .client_share = settings.client_share,
                      .scene_grace_s = settings.scene_grace_s,
@@ -136,9 +152,13 @@ struct ApiServer::State {
                      .slurm = settings.slurm,
                      .can_decompose = rooms.can_decompose},
                     rooms.decompositions, rooms.output, rooms.clock),
-        output(rooms.output) {}
+        output(rooms.output),
+        log_error(rooms.log_error),
+        can_decompose(rooms.can_decompose) {}
 
   absl::Status Listen(const ApiSettings& settings);
+  /// Begins to accept connections, and to look after the clients and the database.
+  void Open();
   absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> Credentials(const ListenAddress& address,
                                                                        const ApiSettings& settings);
 
@@ -147,13 +167,16 @@ struct ApiServer::State {
     return connection == "unix:" || gate->IsOpen(connection);
   }
 
+  /// Looks after the clients and what they need. May wait for the scenes.
+  void KeepClients();
+
   /// Sets the health of DecompositionService when decompositions have become possible or
   /// impossible.
-  void ShowWorkers(bool can) {
-    if (can_decompose.exchange(can) == can) return;
-    servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
-    if (!can) client_log.Warn("decompositions cannot run: their program is missing");
-  }
+  void ShowWorkers(bool can);
+
+  /// Sets the health of ModalModelService and DecompositionService, and logs which of the
+  /// database's files are lost.
+  void ShowDatabase(const absl::Status& files);
 
   GrpcLog grpc_log;
   LimitedLog client_log;
@@ -162,12 +185,21 @@ struct ApiServer::State {
   SceneLeases leases;
   SceneOwners owners;
   IdleCalls idle_calls;
-  FairPool large_steps{StepThreadCount()};
+  CertificateEnd certificate_end;
+  DatabaseKeeper database_keeper;
+  const ClientKeeper client_keeper;
+  // The pools end before the turns and chores, which their tasks use.
+  Chore keep_clients{call_pool, [this] { KeepClients(); }};
+  Chore keep_database{write_pool, [this] { database_keeper.Look(); }};
+  FairTurns large_steps{step_pool, StepThreadCount()};
+  FairTurns adding{call_pool, kAddingThreadCount};
+  ThreadPool step_pool{StepThreadCount()};
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool write_pool{kWriteThreadCount};
-  ThreadPool render_pool{kRenderThreadCount, kRenderNiceness};
+  ThreadPool background_pool{kBackgroundThreadCount, kBackgroundNiceness};
   const Reception reception{access, limits, call_pool};
   const Reception writing{access, limits, write_pool};
+  const Reception background{access, limits, background_pool};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
@@ -176,17 +208,19 @@ struct ApiServer::State {
   SceneService scenes;
   ContactService contacts;
   AudioService audio;
-  CertificateEnd certificate_end;
   ServerService server_info;
   LiveOutput& output;
+  const std::function<void(const std::string& line)> log_error;
+  const std::function<bool()> can_decompose;
   /// The credentials of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
   std::optional<GrpcServers> servers;
   std::optional<ConnectionGate> gate;
-  std::optional<ClientKeeper> keeper;
   std::optional<FloodGuard> flood_guard;
+  /// Not on the gate's thread, because gRPC may parse a flood there when it gets a connection.
+  Timetable timetable;
   std::atomic<bool> stores{true};
-  std::atomic<bool> can_decompose{true};
+  std::atomic<bool> decomposes{true};
   std::vector<std::string> addresses;
 };
 
@@ -221,10 +255,42 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
     return Unready("LISTEN_FAILED",
                    "cannot serve: gRPC does not take the TLS files; see the line before");
   }
-  gate->Open();
-  flood_guard.emplace(*gate, client_log);
   for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
   return absl::OkStatus();
+}
+
+void ApiServer::State::Open() {
+  const auto repeat = [this](Chore& chore, Timetable::Clock::duration period) {
+    timetable.Add([&chore, period] {
+      chore.Start();
+      return period;
+    });
+  };
+  repeat(keep_clients, kClientPeriod);
+  repeat(keep_database, kDatabasePeriod);
+  flood_guard.emplace(*gate, client_log);
+  timetable.Add([this] { return flood_guard->Look(); });
+  gate->Open();
+  timetable.Start();
+}
+
+void ApiServer::State::KeepClients() {
+  client_keeper.Look();
+  ShowWorkers(can_decompose());
+  if (const auto warning = certificate_end.WarningDue()) client_log.Warn(*warning);
+}
+
+void ApiServer::State::ShowWorkers(bool can) {
+  if (decomposes.exchange(can) == can) return;
+  servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
+  if (!can) client_log.Warn("decompositions cannot run: their program is missing");
+}
+
+void ApiServer::State::ShowDatabase(const absl::Status& files) {
+  servers->SetHealth(v1::ModalModelService::service_full_name(), files.ok());
+  stores = files.ok();
+  servers->SetHealth(v1::DecompositionService::service_full_name(), stores && decomposes);
+  if (!files.ok()) log_error(std::string(files.message()));
 }
 
 absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& settings,
@@ -236,23 +302,12 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
     RETURN_IF_ERROR(state->heads.Get(rate_hz).status());
   }
   RETURN_IF_ERROR(state->Listen(settings));
-  state->keeper.emplace(ClientKeeper::Kept{
-      .scenes = rooms.scenes,
-      .owners = state->owners,
-      .idle_calls = state->idle_calls,
-      .idle_limit = Duration(settings.rendering_idle_s),
-      .log = [log = &state->client_log](const std::string& line) { log->Warn(line); },
-      .tick =
-          [state = state.get(), can_decompose = rooms.can_decompose] {
-            state->ShowWorkers(can_decompose());
-            if (const auto warning = state->certificate_end.WarningDue()) {
-              state->client_log.Warn(*warning);
-            }
-          }});
   rooms.output.ObserveDevice([&servers = *state->servers](bool plays) {
     servers.SetHealth(v1::AudioService::service_full_name(), plays);
   });
-  return std::unique_ptr<ApiServer>(new ApiServer(std::move(state)));
+  std::unique_ptr<ApiServer> server(new ApiServer(std::move(state)));
+  server->state_->Open();
+  return server;
 }
 
 absl::Status ApiServer::Reload(const ApiSettings& settings) {
@@ -267,19 +322,13 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
   return absl::OkStatus();
 }
 
-void ApiServer::ShowDatabaseHealth(bool stores) {
-  GrpcServers& servers = *state_->servers;
-  servers.SetHealth(v1::ModalModelService::service_full_name(), stores);
-  state_->stores = stores;
-  servers.SetHealth(v1::DecompositionService::service_full_name(), stores && state_->can_decompose);
-}
-
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
 ApiServer::~ApiServer() {
-  state_->flood_guard.reset();
+  state_->timetable.Stop();
   state_->gate->Close();
-  state_->keeper.reset();
+  state_->keep_clients.Stop();
+  state_->keep_database.Stop();
   state_->output.ObserveDevice(nullptr);
   state_->servers.reset();
 }

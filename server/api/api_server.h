@@ -54,6 +54,8 @@ struct ServedRooms {
   LiveOutput& output;
   Clock& clock;
   std::function<void(const std::string& line)> log;  ///< takes warnings
+  /// Takes lines that say which of the database's files are lost.
+  std::function<void(const std::string& line)> log_error = [](const std::string&) {};
   /// Returns whether decompositions can run. Called several times a second.
   std::function<bool()> can_decompose = [] { return true; };
 };
@@ -67,8 +69,10 @@ struct ClientCounts {
 };
 
 /// A gRPC server with all services of carillon.v1, health and reflection. The health of
-/// carillon.v1.AudioService is NOT_SERVING while the wanted sound device does not play. The health
-/// of the whole server ("") is SERVING.
+/// carillon.v1.AudioService is NOT_SERVING while the wanted sound device does not play, that of
+/// carillon.v1.ModalModelService while files of the database are lost, and that of
+/// carillon.v1.DecompositionService also while decompositions cannot run. The health of the whole
+/// server ("") is SERVING.
 class ApiServer {
  public:
   /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
@@ -86,10 +90,6 @@ class ApiServer {
   /// Reads the access file and the TLS files anew. Connections and calls go on. Errors: those of
   /// Start about these files; an error changes nothing.
   absl::Status Reload(const ApiSettings& settings);
-
-  /// Sets the health of carillon.v1.ModalModelService. carillon.v1.DecompositionService is healthy
-  /// if ModalModelService is healthy and decompositions can run.
-  void ShowDatabaseHealth(bool stores);
 
   ClientCounts clients() const;
 

@@ -12,7 +12,7 @@
 namespace carillon {
 
 /// The time at which the first of the daemon's certificates expires. Any thread may call all
-/// functions except WarningDue, which only one thread may call.
+/// functions except WarningDue, which only one thread at a time may call.
 class CertificateEnd {
  public:
   /// Number of days before the end in which the daemon warns.

@@ -3,36 +3,20 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 
 #include "absl/strings/str_cat.h"
 
 namespace carillon {
-namespace {
 
-constexpr std::chrono::milliseconds kPeriod(250);
-
-}  // namespace
-
-ClientKeeper::ClientKeeper(Kept kept) : kept_(std::move(kept)), thread_([this] { Run(); }) {}
-
-ClientKeeper::~ClientKeeper() {
-  stop_.release();
-  thread_.join();
-}
-
-void ClientKeeper::Run() {
-  while (!stop_.try_acquire_for(kPeriod)) {
-    for (const uint64_t scene : kept_.owners.leases().Expired()) {
-      const std::string name = kept_.scenes.NameOf(scene);
-      // A client may have deleted the scene meanwhile.
-      const bool ended = kept_.scenes.DeleteScene(scene).ok();
-      kept_.owners.Remove(scene);
-      if (ended) kept_.log(absl::StrCat(name, " has ended: its clients have gone"));
-    }
-    kept_.idle_calls.EndIdle(kept_.idle_limit);
-    kept_.tick();
+void ClientKeeper::Look() const {
+  for (const uint64_t scene : kept_.owners.leases().Expired()) {
+    const std::string name = kept_.scenes.NameOf(scene);
+    // A client may have deleted the scene meanwhile.
+    const bool ended = kept_.scenes.DeleteScene(scene).ok();
+    kept_.owners.Remove(scene);
+    if (ended) kept_.log(absl::StrCat(name, " has ended: its clients have gone"));
   }
+  kept_.idle_calls.EndIdle(kept_.idle_limit);
 }
 
 }  // namespace carillon

@@ -3,9 +3,8 @@
 
 #include <chrono>
 #include <functional>
-#include <semaphore>
 #include <string>
-#include <thread>
+#include <utility>
 
 #include "server/api/idle_calls.h"
 #include "server/api/scene_owners.h"
@@ -13,7 +12,7 @@
 
 namespace carillon {
 
-/// A thread that ends scenes whose lease is over, and idle calls.
+/// Ends scenes whose lease is over, and idle calls.
 class ClientKeeper {
  public:
   /// Takes a line for people to read.
@@ -25,23 +24,16 @@ class ClientKeeper {
     IdleCalls& idle_calls;
     std::chrono::nanoseconds idle_limit;
     Log log;
-    std::function<void()> tick;  ///< called several times a second
   };
 
   /// The parts of `kept` must outlive the keeper.
-  explicit ClientKeeper(Kept kept);
+  explicit ClientKeeper(Kept kept) : kept_(std::move(kept)) {}
 
-  /// Joins the thread.
-  ~ClientKeeper();
-  ClientKeeper(const ClientKeeper&) = delete;
-  ClientKeeper& operator=(const ClientKeeper&) = delete;
+  /// Must be called several times a second.
+  void Look() const;
 
  private:
-  void Run();
-
   const Kept kept_;
-  std::binary_semaphore stop_{0};
-  std::thread thread_;
 };
 
 }  // namespace carillon

@@ -226,7 +226,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   enum class Turn {
     kFree,    ///< on gRPC's thread, without spending the budget
     kPaid,    ///< on gRPC's thread, by Pay
-    kInPool,  ///< on a thread of large_steps
+    kInPool,  ///< on a thread that large_steps gives
   };
 
   const ContactContext daemon_;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/contact_service.grpc.pb.h"
-#include "server/api/fair_pool.h"
+#include "server/api/fair_turns.h"
 #include "server/api/raw_service.h"
 #include "server/api/reception.h"
 #include "server/api/scene_owners.h"
@@ -21,7 +21,7 @@ struct ContactContext {
   Clock& clock;
   SceneOwners& owners;
   Reception reception;
-  FairPool& large_steps;  ///< takes the steps that keep a thread busy for long
+  FairTurns& large_steps;  ///< takes the steps that keep a thread busy for long
 };
 
 /// The parts of the service that several of its calls share.

@@ -66,29 +66,18 @@ uint64_t MostIdleBytes(uint64_t open_count, uint64_t acknowledged, double second
          acknowledged / kReceivedPerSent + static_cast<uint64_t>(kPingBytesPerSecond * seconds);
 }
 
-FloodGuard::FloodGuard(ConnectionGate& gate, LimitedLog& log)
-    : gate_(gate), log_(log), thread_([this] { Run(); }) {}
-
-FloodGuard::~FloodGuard() {
-  stop_.release();
-  thread_.join();
+FloodGuard::Clock::duration FloodGuard::Look() {
+  // A flood keeps this thread waiting for a processor, which must not make the guard look less
+  // often. Therefore processor time is measured.
+  const double begin_s = ProcessorTimeS();
+  LookAtConnections(Clock::now());
+  const double taken_s = ProcessorTimeS() - begin_s;
+  return std::max<Clock::duration>(kPeriod,
+                                   std::chrono::duration_cast<Clock::duration>(
+                                       std::chrono::duration<double>(taken_s / kMostLoad)));
 }
 
-void FloodGuard::Run() {
-  Clock::duration pause = kPeriod;
-  while (!stop_.try_acquire_for(pause)) {
-    // A flood keeps this thread waiting for a processor, which must not make the guard look less
-    // often. Therefore processor time is measured.
-    const double begin_s = ProcessorTimeS();
-    Look(Clock::now());
-    const double taken_s = ProcessorTimeS() - begin_s;
-    pause =
-        std::max<Clock::duration>(kPeriod, std::chrono::duration_cast<Clock::duration>(
-                                               std::chrono::duration<double>(taken_s / kMostLoad)));
-  }
-}
-
-void FloodGuard::Look(Clock::time_point now) {
+void FloodGuard::LookAtConnections(Clock::time_point now) {
   WatchNewConnections(now);
   if (now >= next_sweep_) {
     next_sweep_ = now + kSweepPeriod;

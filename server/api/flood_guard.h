@@ -4,9 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
-#include <semaphore>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "server/api/connection_calls.h"
@@ -44,7 +42,7 @@ uint64_t MostIdleBytes(uint64_t open_count, uint64_t acknowledged, double second
 /// empty string if the connection may stay. `before` was counted `seconds` before `now`.
 std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now, double seconds);
 
-/// A thread that closes connections whose clients begin calls without end, because gRPC 1.51 bounds
+/// Closes connections whose clients begin calls without end, because gRPC 1.51 bounds
 /// neither calls that are cancelled at once nor calls that never send their message, and keeps the
 /// headers of a call that never end. It also counts the calls of each process and address, so that
 /// a client that makes a new connection for each flood is found. The guard also
@@ -52,16 +50,18 @@ std::string FindFlood(const ConnectionCalls& before, const ConnectionCalls& now,
 /// ConnectionGate::RefusalTimeOf().
 class FloodGuard {
  public:
-  /// `gate` and `log` must outlive the guard.
-  FloodGuard(ConnectionGate& gate, LimitedLog& log);
+  using Clock = std::chrono::steady_clock;
 
-  /// Joins the thread.
-  ~FloodGuard();
+  /// `gate` and `log` must outlive the guard.
+  FloodGuard(ConnectionGate& gate, LimitedLog& log) : gate_(gate), log_(log) {}
   FloodGuard(const FloodGuard&) = delete;
   FloodGuard& operator=(const FloodGuard&) = delete;
 
+  /// Looks at some connections, and returns the time after which the next look is due. Only one
+  /// thread may call it.
+  Clock::duration Look();
+
  private:
-  using Clock = std::chrono::steady_clock;
   struct Watched {
     std::string peer;
     std::string source;        ///< SourceOfPeer
@@ -83,10 +83,9 @@ class FloodGuard {
     Clock::time_point since{};
   };
 
-  void Run();
   /// Examines the connections that most likely flood, which are the newest and the busy ones, and
   /// some of the others in turn.
-  void Look(Clock::time_point now);
+  void LookAtConnections(Clock::time_point now);
   void WatchNewConnections(Clock::time_point now);
   std::vector<int64_t> ChooseConnections();
   void LookAt(WatchedById::iterator at, Clock::time_point now);
@@ -108,8 +107,6 @@ class FloodGuard {
   std::map<std::string, Source> sources_;
   Clock::time_point next_sweep_{};
   int64_t next_in_turn_ = 0;
-  std::binary_semaphore stop_{0};
-  std::thread thread_;
 };
 
 }  // namespace carillon

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "carillon/v1/scene_service.grpc.pb.h"
-#include "server/api/fair_pool.h"
+#include "server/api/fair_turns.h"
 #include "server/api/reception.h"
 #include "server/api/resource_name.h"
 #include "server/api/scene_owners.h"
@@ -21,13 +21,16 @@ namespace carillon {
 /// service.
 class SceneService final : public v1::SceneService::CallbackService {
  public:
+  /// `adding` makes the objects of AddObjects. A thousand objects take half a second, so that a few
+  /// calls would occupy all threads of the reception.
   SceneService(SceneRegistry& scenes, SceneOwners& owners, ModeDatabase& database, HeadStore& heads,
-               const Reception& reception)
+               const Reception& reception, FairTurns& adding)
       : scenes_(scenes),
         owners_(owners),
         database_(database),
         heads_(heads),
-        reception_(reception) {}
+        reception_(reception),
+        adding_(adding) {}
 
   grpc::ServerUnaryReactor* CreateScene(grpc::CallbackServerContext* context,
                                         const v1::CreateSceneRequest* request,
@@ -94,9 +97,7 @@ class SceneService final : public v1::SceneService::CallbackService {
   ModeDatabase& database_;
   HeadStore& heads_;
   const Reception reception_;
-  /// Makes the objects of AddObjects. A thousand objects take half a second, so that a few calls
-  /// would occupy all threads of the reception. One client has one of these threads.
-  FairPool adding_{2};
+  FairTurns& adding_;
   /// Held while a scene with a client's id is made, so that two equal requests make one scene.
   Mutex create_mutex_;
 };

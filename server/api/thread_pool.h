@@ -13,13 +13,13 @@
 namespace carillon {
 
 /// Threads for calls that block (for the database or offline rendering), so that gRPC's own threads
-/// never wait. Tasks start in the order in which they were added.
+/// never wait. Tasks may add further tasks. Tasks start in the order in which they were added.
 class ThreadPool {
  public:
   /// `niceness`, 0 to 19, lowers the scheduling priority of the threads.
   explicit ThreadPool(int thread_count, int niceness = 0);
 
-  /// Runs all tasks added so far, then joins the threads.
+  /// Runs all tasks, then joins the threads.
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;

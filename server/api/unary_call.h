@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "server/api/exception_barrier.h"
-#include "server/api/fair_pool.h"
+#include "server/api/fair_turns.h"
 #include "server/api/reception.h"
 #include "server/api/status_conversion.h"
 
@@ -62,14 +62,14 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Rec
   return AnswerAdmitted(context, reception, role, run, std::move(work));
 }
 
-/// The same for a call that keeps a thread busy for long. It runs on threads that the clients share
-/// fairly.
+/// The same for a call that keeps a thread busy for long. The clients share the threads of
+/// `turns` fairly.
 template <typename Work>
 grpc::ServerUnaryReactor* AnswerFairly(grpc::CallbackServerContext* context,
-                                       const Reception& reception, Role role, FairPool& pool,
+                                       const Reception& reception, Role role, FairTurns& turns,
                                        Work work) {
   const auto run = [&](const Principal& caller, std::function<void()> step) {
-    pool.Run(caller.client, std::move(step));
+    turns.Run(caller.client, std::move(step));
   };
   return AnswerAdmitted(context, reception, role, run, std::move(work));
 }

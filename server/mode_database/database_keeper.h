@@ -2,16 +2,16 @@
 #pragma once
 
 #include <functional>
-#include <semaphore>
-#include <thread>
+#include <optional>
+#include <utility>
 
 #include "absl/status/status.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {
 
-/// A thread that calls Database::CheckFiles once a second, and gives free pages back to the disk.
-/// DatabaseFiles says which files are checked, and how.
+/// Calls Database::CheckFiles, and gives free pages back to the disk. DatabaseFiles says which
+/// files are checked, and how.
 class DatabaseKeeper {
  public:
   /// Takes the first result of Database::CheckFiles, and each result that differs from the previous
@@ -19,20 +19,17 @@ class DatabaseKeeper {
   using Observer = std::function<void(const absl::Status& files)>;
 
   /// `database` must outlive the keeper.
-  DatabaseKeeper(Database& database, Observer observer);
+  DatabaseKeeper(Database& database, Observer observer)
+      : database_(database), observer_(std::move(observer)) {}
 
-  /// Joins the thread.
-  ~DatabaseKeeper();
-  DatabaseKeeper(const DatabaseKeeper&) = delete;
-  DatabaseKeeper& operator=(const DatabaseKeeper&) = delete;
+  /// Must be called about once a second, by one thread at a time. Waits for the disk and for the
+  /// write lock of the database.
+  void Look();
 
  private:
-  void Run();
-
   Database& database_;
   const Observer observer_;
-  std::binary_semaphore stop_{0};
-  std::thread thread_;
+  std::optional<absl::Status> last_;
 };
 
 }  // namespace carillon

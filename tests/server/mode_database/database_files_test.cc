@@ -10,9 +10,9 @@
 #include <atomic>
 #include <fstream>
 #include <functional>
-#include <semaphore>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
@@ -180,14 +180,14 @@ TEST_F(DatabaseFilesTest, UnfinishedBackupsAreRemovedAtTheStart) {
 }
 
 TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
-  std::binary_semaphore good{0};
-  std::binary_semaphore lost{0};
-  const DatabaseKeeper keeper(database_->database(), [&](const absl::Status& files) {
-    (files.ok() ? good : lost).release();
-  });
-  good.acquire();
+  std::vector<bool> good;
+  DatabaseKeeper keeper(database_->database(),
+                        [&good](const absl::Status& files) { good.push_back(files.ok()); });
+  for (int i = 0; i < 3; ++i) keeper.Look();
+  EXPECT_THAT(good, testing::ElementsAre(true));
   std::filesystem::remove(file_);
-  lost.acquire();
+  for (int i = 0; i < 3; ++i) keeper.Look();
+  EXPECT_THAT(good, testing::ElementsAre(true, false));
 }
 
 TEST(DiskReserve, IsAQuarterOfTheFreeSpaceWithinItsBounds) {

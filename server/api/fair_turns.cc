@@ -1,48 +1,39 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/fair_pool.h"
+#include "server/api/fair_turns.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace carillon {
 
-FairPool::FairPool(int thread_count) : most_running_(std::max(1, thread_count / 2)) {
-  for (int i = 0; i < thread_count; ++i) threads_.emplace_back([this] { RunTasks(); });
-}
-
-FairPool::~FairPool() {
-  ready_.release(static_cast<ptrdiff_t>(threads_.size()));
-  for (std::thread& thread : threads_) thread.join();
-}
-
-void FairPool::Run(const std::string& client, std::function<void()> task) {
+void FairTurns::Run(const std::string& client, std::function<void()> task) {
   const MutexLock lock(&mutex_);
   Client& entry = clients_[client];
   entry.tasks.push_back(std::move(task));
   GiveTurns(client, entry);
+  AskForThreads();
 }
 
-void FairPool::GiveTurns(const std::string& name, Client& client) {
+void FairTurns::GiveTurns(const std::string& name, Client& client) {
   while (client.turn_count < static_cast<int>(client.tasks.size()) &&
-         client.turn_count + client.running_count < most_running_) {
+         client.turn_count + client.running_count < most_of_client_) {
     ++client.turn_count;
     turns_.push_back(name);
-    ready_.release();
   }
 }
 
-void FairPool::RunTasks() {
-  while (RunNext()) {
+void FairTurns::AskForThreads() {
+  while (asked_count_ < static_cast<int>(turns_.size()) &&
+         asked_count_ + running_count_ < most_running_) {
+    ++asked_count_;
+    pool_.Run([this] { RunNext(); });
   }
 }
 
-bool FairPool::RunNext() {
-  ready_.acquire();
+void FairTurns::RunNext() {
   std::string name;
   std::function<void()> task;
   {
     const MutexLock lock(&mutex_);
-    if (turns_.empty()) return false;
     name = std::move(turns_.front());
     turns_.pop_front();
     Client& client = clients_[name];
@@ -50,14 +41,18 @@ bool FairPool::RunNext() {
     ++client.running_count;
     task = std::move(client.tasks.front());
     client.tasks.pop_front();
+    --asked_count_;
+    ++running_count_;
   }
   task();
+  task = nullptr;
   const MutexLock lock(&mutex_);
+  --running_count_;
   const auto client = clients_.find(name);
   --client->second.running_count;
   GiveTurns(name, client->second);
   if (client->second.turn_count + client->second.running_count == 0) clients_.erase(client);
-  return true;
+  AskForThreads();
 }
 
 }  // namespace carillon

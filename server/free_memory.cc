@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/heap_keeper.h"
+#include "server/free_memory.h"
 
 #include <malloc.h>
 
 #include <algorithm>
-#include <chrono>
 #include <thread>
 
 namespace carillon {
@@ -14,7 +13,6 @@ namespace {
 constexpr int kOwnPagesBytes = 256 << 10;
 /// Free memory that stays at the end of an arena.
 constexpr int kKeptBytes = 1 << 20;
-constexpr std::chrono::seconds kPeriod(5);
 
 }  // namespace
 
@@ -24,15 +22,6 @@ void BoundFreeMemory() {
   mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
 }
 
-HeapKeeper::HeapKeeper() : thread_([this] { Run(); }) {}
-
-HeapKeeper::~HeapKeeper() {
-  stop_.release();
-  thread_.join();
-}
-
-void HeapKeeper::Run() {
-  while (!stop_.try_acquire_for(kPeriod)) malloc_trim(kKeptBytes);
-}
+void ReturnFreeMemory() { malloc_trim(kKeptBytes); }
 
 }  // namespace carillon
