@@ -5,6 +5,7 @@
 #include <semaphore>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "server/api/thread_pool.h"
 
 namespace carillon {
@@ -23,8 +24,8 @@ class Chore {
   void Start() {
     if (!idle_.try_acquire()) return;
     pool_.Run([this] {
+      const absl::Cleanup end = [this] { idle_.release(); };  // also after an exception
       work_();
-      idle_.release();
     });
   }
 
