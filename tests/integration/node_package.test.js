@@ -376,9 +376,17 @@ test('a recording is taken once, for a time above zero', async () => {
 
 test('a stream that is too fast drops the oldest steps', async () => withScene(async (scene) => {
   const stream = scene.stream({ step: 0.001 });
+  const write = stream.call.write.bind(stream.call);
+  let messageCount = 0;
+  stream.call.write = (...request) => {
+    messageCount += 1;
+    return write(...request);
+  };
   // Nothing is sent while this loop does not wait.
   for (let i = 0; i < 5000; i += 1) stream.step(0.001 * i, {});
   assert.ok(stream.droppedStepCount > 5000 - 4096 - 100);
   const report = await stream.close();
   assert.equal(Number(report.step_count) + stream.droppedStepCount, 5000);
+  assert.ok(messageCount < 100, `the steps that waited were sent in ${messageCount} messages`);
+  assert.equal(stream.waitingStepCount, 0);
 }));

@@ -237,6 +237,12 @@ function makeStep(time, own) {
   return step;
 }
 
+/** The number of contacts and poses of a step. */
+function countRows({ impulses, columns, sustained, contacts, contact_columns, pose_columns }) {
+  const lists = [impulses, columns?.object, sustained, contacts, contact_columns?.impulses.object, pose_columns?.object];
+  return lists.reduce((count, list) => count + (list?.length ?? 0), 0);
+}
+
 /** The rows of one strike. Throws a TypeError if it has not one point and one impulse, or if the impulse is zero. */
 function strikeOf(object, { point, impulse, duration, striker } = {}) {
   tuple(point, 3, 'point', "[x, y, z]: metres in the object's own frame");
@@ -257,4 +263,4 @@ function frameInWords(frame) {
   return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
 }
 
-module.exports = { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose };
+module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose };

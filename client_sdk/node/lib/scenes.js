@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
+const { countRows, frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
@@ -11,6 +11,9 @@ const { warnOfContacts, warnOfOpenStream, warnOfStream } = require('./warnings')
 
 // Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
+/** Steps that wait are sent together up to these numbers, because a message costs far more than a small step. */
+const MOST_STEPS_TOGETHER = 256;
+const MOST_ROWS_TOGETHER = 1024;
 const OBJECT_KEYS = ['material', 'size', 'gain', 'pose', 'radiation'];
 
 /** An object of a scene. It may be given wherever handles are wanted. */
@@ -189,6 +192,7 @@ class ContactStream {
       });
     });
     this.waiting = [];
+    this.handedCount = 0; // steps that gRPC has not sent yet
     this.isFull = !this.call.write({ start });
     this.call.on('drain', () => {
       this.isFull = false;
@@ -198,8 +202,26 @@ class ContactStream {
 
   /** Hands steps to the network while it takes them. */
   write() {
-    while (this.waiting.length && !this.isFull) this.isFull = !this.call.write(this.waiting.shift());
+    while (this.waiting.length && !this.isFull) {
+      const steps = this.takeSteps();
+      this.handedCount += steps.length;
+      this.isFull = !this.call.write(steps.length === 1 ? { step: steps[0] } : { steps: { steps } }, () => {
+        this.handedCount -= steps.length;
+      });
+    }
     if (this.isClosing && !this.waiting.length) this.call.end();
+  }
+
+  /** Takes the oldest steps that wait, as many as one message has. */
+  takeSteps() {
+    let count = 1;
+    let rowCount = countRows(this.waiting[0]);
+    while (count < Math.min(this.waiting.length, MOST_STEPS_TOGETHER)) {
+      rowCount += countRows(this.waiting[count]);
+      if (rowCount > MOST_ROWS_TOGETHER) break;
+      count += 1;
+    }
+    return this.waiting.splice(0, count);
   }
 
   /** What the daemon found out about the contacts so far, such as blow_count and distant_point_count. */
@@ -230,7 +252,7 @@ class ContactStream {
 
   /** How many steps wait for the network. */
   get waitingStepCount() {
-    return this.waiting.length + this.call.writableLength;
+    return this.waiting.length + this.handedCount;
   }
 
   /**
@@ -251,7 +273,7 @@ class ContactStream {
       this.waiting.shift();
       this.droppedStepCount += 1;
     }
-    this.waiting.push({ step: makeStep(time, content) });
+    this.waiting.push(makeStep(time, content));
     this.write();
     return new Promise(setImmediate);
   }

@@ -19,7 +19,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).parent
-DELAY_S = 0.1
+DELAYS_S = {"C++": 0.1, "Python": 1, "Node": 1}
 OBJECT_COUNT = 16
 LATENCY_DELAYS_S = (0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.050, 0.1)
 
@@ -51,7 +51,7 @@ class Bench:
 
     def throughput(self, language, place, server, form, size, seconds):
         more = (0,) if language == "C++" else ()
-        counts = self.run(language, server, form, size, seconds, DELAY_S, *more)
+        counts = self.run(language, server, form, size, seconds, DELAYS_S[language], *more)
         total = counts["accepted"] + counts["late"] + counts["dropped"] + counts["rejected"]
         assert total == size * counts["steps"], counts
         row = (f"{language} | {place} | {form} | {size} | {total / counts['seconds'] / 1000:.1f} | "

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 # Steps that may wait for the network before the oldest is dropped.
 MOST_WAITING = 4096
+# Steps that wait are sent together up to this number and size, because a message costs far more than a small step.
+MOST_STEPS_TOGETHER = 256
+MOST_BYTES_TOGETHER = 65536
 ADD_ARGUMENTS = ("model", "material", "size", "gain", "pose", "handle", "radiation")
 
 
@@ -251,7 +254,7 @@ class ContactStream:
     def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
         self._start = start
-        self._requests: queue.SimpleQueue[Optional[contact_service_pb2.StreamContactsRequest]] = queue.SimpleQueue()
+        self._steps: queue.SimpleQueue[Optional[contact_pb2.ContactStep]] = queue.SimpleQueue()
         self._error: Optional[grpc.RpcError] = None
         self._is_closed = False
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
@@ -284,7 +287,7 @@ class ContactStream:
     @property
     def waiting_step_count(self) -> int:
         """How many steps wait for the network."""
-        return self._requests.qsize()
+        return self._steps.qsize()
 
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
@@ -304,16 +307,16 @@ class ContactStream:
         if self._error:
             _open_streams.streams.discard(self)
             raise errors.from_rpc(self._error, self._server)
-        if self._requests.qsize() >= MOST_WAITING:
+        if self._steps.qsize() >= MOST_WAITING:
             with contextlib.suppress(queue.Empty):  # the thread that sends may have taken it meanwhile
-                self._requests.get_nowait()
+                self._steps.get_nowait()
                 self.dropped_step_count += 1
-        self._requests.put(contact_service_pb2.StreamContactsRequest(step=step))
+        self._steps.put(step)
 
     def close(self, warn: bool = True) -> contact_service_pb2.StreamContactsResponse:
         """Waits until the daemon has taken all steps. Returns the last report."""
         self._end()
-        self._requests.put(None)
+        self._steps.put(None)
         self._reader.join()
         if self._error:
             raise errors.from_rpc(self._error, self._server)
@@ -333,8 +336,33 @@ class ContactStream:
     def _sent(self, start: contact_service_pb2.ContactStreamStart
               ) -> Iterator[contact_service_pb2.StreamContactsRequest]:
         yield contact_service_pb2.StreamContactsRequest(start=start)
-        while (request := self._requests.get()) is not None:
-            yield request
+        step = self._steps.get()
+        while step is not None:
+            steps, following = self._take_waiting(step)
+            if len(steps) > 1:
+                yield contact_service_pb2.StreamContactsRequest(steps=contact_service_pb2.ContactSteps(steps=steps))
+            else:
+                yield contact_service_pb2.StreamContactsRequest(step=step)
+            step = following[0] if following else self._steps.get()
+
+    def _take_waiting(self, step: contact_pb2.ContactStep
+                      ) -> tuple[list[contact_pb2.ContactStep], list[Optional[contact_pb2.ContactStep]]]:
+        """Returns the steps of the next message, the step and those that wait, as far as there is room. The second
+        list has what was taken from the queue beyond them: a step, None at the end, or nothing."""
+        steps = [step]
+        byte_count = None
+        while len(steps) < MOST_STEPS_TOGETHER and not self._steps.empty():
+            try:
+                waiting = self._steps.get_nowait()
+            except queue.Empty:  # the simulation's thread dropped it
+                break
+            if waiting is None:
+                return steps, [None]
+            byte_count = (step.ByteSize() if byte_count is None else byte_count) + waiting.ByteSize()
+            if byte_count > MOST_BYTES_TOGETHER:
+                return steps, [waiting]
+            steps.append(waiting)
+        return steps, []
 
     def _read(self) -> None:
         try:
@@ -342,7 +370,7 @@ class ContactStream:
                 self.report = answer
         except grpc.RpcError as error:
             self._error = error
-            self._requests.put(None)  # ends the thread that sends
+            self._steps.put(None)  # ends the thread that sends
 
     def __repr__(self) -> str:
         report = self.report
