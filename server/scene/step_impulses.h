@@ -18,7 +18,7 @@ namespace carillon {
 /// but it takes one place in the mixer's queues instead of many.
 class StepImpulses {
  public:
-  /// What impulses have in common that become one event.
+  /// The properties that the impulses of one event have in common.
   struct Key {
     uint32_t handle = 0;
     double time_offset_s = 0;

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "proto/cpp/error_reason.h"
-#include "server/scene/felt_contact.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
@@ -379,23 +378,6 @@ TEST(SceneRegistry, DeletingASceneSilencesIt) {
   ASSERT_TRUE(stage.scenes.DeleteScene(stage.scene).ok());
   stage.Render(9);
   EXPECT_THAT(stage.Render(4), Each(0.0F));
-}
-
-TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
-  Stage stage;
-  ObjectProperties properties = SmallProperties();
-  properties.material.size = 3;
-  const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties);
-  ObjectContact contact = SmallImpulse(1).contact;
-  // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
-  contact.impulse.location = Point{0, 0.15, 0};
-  FeltContact felt;
-  ASSERT_TRUE(Feel(contact, placed.object, nullptr, felt).ok());
-  const TrianglePoint& at = felt.by[0].impulse().at;
-  for (size_t corner = 0; corner < 3; ++corner) {
-    const uint32_t vertex = at.vertices[corner];
-    EXPECT_NEAR(at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
-  }
 }
 
 }  // namespace

@@ -6,6 +6,8 @@
 
 #include <memory>
 
+#include "server/scene/felt_contact.h"
+#include "server/scene/scene_registry.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
@@ -32,6 +34,24 @@ TEST(BodyCache, KeepsNoMemoryOfBodiesThatNobodyUses) {
   make_and_forget();
   // A sanitizer has a heap of its own, of which mallinfo2 knows nothing.
   EXPECT_LT(mallinfo2().uordblks, before + 50 * kBodies);
+}
+
+TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
+  Mixer mixer;
+  SceneRegistry scenes(mixer);
+  ObjectProperties properties = SmallProperties();
+  properties.material.size = 3;
+  const PlacedObject placed = *scenes.AddObject(*scenes.CreateScene(), 0, SmallModel(), properties);
+  ObjectContact contact = SmallImpulse(1).contact;
+  // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
+  contact.impulse.location = Point{0, 0.15, 0};
+  FeltContact felt;
+  ASSERT_TRUE(Feel(contact, placed.object, nullptr, felt).ok());
+  const TrianglePoint& at = felt.by[0].impulse().at;
+  for (size_t corner = 0; corner < 3; ++corner) {
+    const uint32_t vertex = at.vertices[corner];
+    EXPECT_NEAR(at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);
+  }
 }
 
 }  // namespace
