@@ -94,7 +94,9 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   void RunTaking(const v1::StreamContactsRequest& request,
                  const std::function<void()>& step) override {
-    size_t row_count = CountRowsOf(request.step());
+    // A step takes time even without rows.
+    size_t row_count =
+        CountRowsOf(request.step()) + static_cast<size_t>(request.steps().steps_size());
     for (const v1::ContactStep& one : request.steps().steps()) row_count += CountRowsOf(one);
     if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
     if (row_count > kMostRowsAtOnce) return RunInPool(step);

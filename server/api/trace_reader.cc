@@ -121,10 +121,10 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   if (!(step.time_s() >= time_s_ && step.time_s() <= OfflineRenderer::kMaxTimeS)) {
-    return Malformed(
-        absl::StrCat("a step at ", step.time_s(), " s follows one at ", time_s_,
-                     " s; times start at zero or at the clock's first, do not go back, and end by ",
-                     OfflineRenderer::kMaxTimeS, " s"));
+    return Malformed(absl::StrCat(
+        "a step at ", step.time_s(), " s, where the earliest possible time is ", time_s_,
+        " s; times start at zero or at the clock's first, do not go back, and end by ",
+        OfflineRenderer::kMaxTimeS, " s"));
   }
   time_s_ = step.time_s();
   impulse_count_ += CountRows(step);

@@ -29,9 +29,10 @@ size_t HashOf(const StepImpulses::Key& key) {
 }  // namespace
 
 void StepImpulses::Struck::Add(const Vector3& impulse_newton_seconds) {
-  auto& sum = std::get<SurfaceImpulse>(felt.event.action).impulse_newton_seconds;
-  for (size_t axis = 0; axis < sum.size(); ++axis) {
-    sum[axis] += static_cast<float>(impulse_newton_seconds[axis]);
+  auto& vector = std::get<SurfaceImpulse>(felt.event.action).impulse_newton_seconds;
+  for (size_t axis = 0; axis < vector.size(); ++axis) {
+    sum_newton_seconds[axis] += impulse_newton_seconds[axis];
+    vector[axis] = static_cast<float>(sum_newton_seconds[axis]);
   }
   ++felt.event.added_count;
 }
@@ -48,6 +49,7 @@ void StepImpulses::Append(const ObjectImpulse& impulse, const Felt& felt, double
   const std::optional<Key> key = KeyOf(impulse);
   if (!key) return;
   struck.key = *key;
+  struck.sum_newton_seconds = impulse.contact.impulse.impulse_newton_seconds;
   table_[HashOf(*key) % kTableSize] = static_cast<uint16_t>(struck_.size() - 1);
 }
 

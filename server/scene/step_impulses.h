@@ -32,6 +32,7 @@ class StepImpulses {
     Felt felt{};
     double frame = 0;
     Key key{};
+    Vector3 sum_newton_seconds{};  ///< in double precision, so that many small impulses count
 
     /// Adds the vector of one more impulse.
     void Add(const Vector3& impulse_newton_seconds);

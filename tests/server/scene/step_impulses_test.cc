@@ -96,6 +96,16 @@ TEST_F(StepImpulsesTest, ImpulsesThatDifferBecomeEventsOfTheirOwn) {
   EXPECT_EQ(Strike(elastic).size(), 3U);
 }
 
+TEST_F(StepImpulsesTest, ManySmallImpulsesAreNotLostBesideALargeOne) {
+  const Point point{0.01, 0.02, 0};
+  std::vector<ObjectImpulse> impulses(65000, ImpulseAt(point, {1e-5, 0, 0}));
+  impulses.insert(impulses.begin(), ImpulseAt(point, {4000, 0, 0}));
+  impulses.push_back(ImpulseAt(point, {-4000, 0, 0}));
+  const auto events = Strike(impulses);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_NEAR(events[0].impulse()->impulse_newton_seconds[0], 0.65, 1e-7);
+}
+
 TEST_F(StepImpulsesTest, InTheScenesFrameEachImpulseIsTurnedOnItsOwn) {
   const ObjectImpulse impulse = ImpulseAt({0.01, 0.02, 0}, {1, 2, 3});
   EXPECT_EQ(Strike({impulse, impulse}, {.scene_frame = true}).size(), 2U);
