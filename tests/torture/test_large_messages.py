@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Long messages of up to a million entries without content, which take memory and time to parse.
+"""Messages of up to a million entries without content, which take memory and time to parse.
 
 A good client goes on meanwhile, and the daemon's memory comes back.
 """
@@ -25,10 +25,10 @@ LEFT_MIB = 32
 REST_S = 60
 
 
-def repeated(message):
+def repeated(message, byte_count=MESSAGE_BYTES):
     """The message again and again, which protobuf reads as one message with all the entries."""
     once = message.SerializeToString()
-    return once * (MESSAGE_BYTES // len(once))
+    return once * (byte_count // len(once))
 
 
 class Flood:
@@ -72,10 +72,10 @@ class LargeMessageTest(torture.ServedTest):
         super().setUp()
         self.serve()
 
-    def attack(self, method, first, large):
+    def attack(self, method, first, attacking):
         good = self.client.audio.GetMixer
         quiet, before_mib = self.calls(good, 1.0)
-        flood = Flood(self.daemon.server, method, first.SerializeToString(), repeated(large))
+        flood = Flood(self.daemon.server, method, first.SerializeToString(), attacking)
         try:
             amid, most_mib = self.calls(good, RUN_S)
         finally:
@@ -95,14 +95,23 @@ class LargeMessageTest(torture.ServedTest):
         request = contact_service_pb2.StreamContactsRequest
         self.attack("/carillon.v1.ContactService/StreamContacts",
                     request(start=contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.01)),
-                    request(step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()])))
+                    repeated(request(step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()]))))
+
+    def test_short_messages_of_many_steps(self):
+        scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
+        request = contact_service_pb2.StreamContactsRequest
+        steps = contact_service_pb2.ContactSteps(steps=[contact_pb2.ContactStep()])
+        self.attack("/carillon.v1.ContactService/StreamContacts",
+                    request(start=contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.01)),
+                    repeated(request(steps=steps), byte_count=1000))
 
     def test_renderings(self):
         record = contact_trace_pb2.ContactTraceRecord
         request = audio_service_pb2.RenderRequest
         self.attack("/carillon.v1.AudioService/Render",
                     request(settings=audio_service_pb2.RenderSettings()),
-                    request(record=record(step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()]))))
+                    repeated(request(record=record(
+                        step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()])))))
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 
 Every impulse must be accounted for: applied in time, or applied and then merged or left out by the mixer, which counts
 both. The scheduling delay is long enough for what waits in a client, and short enough that the mixer has places for
-what waits there. In rows and columns each object is struck at one point, so that the impulses of a message become one event
-for each object; in "spread" columns each impulse has a point, and an event, of its own.
+what waits there. In rows and columns each object is struck at one point, so that the impulses of a message become one
+event for each object; in "spread" columns each impulse has a point, and an event, of its own.
 """
 
 import argparse
