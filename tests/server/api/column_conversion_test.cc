@@ -158,7 +158,7 @@ TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
 TEST(Columns, ARejectionNamesItsRowUnlessThereIsOneOnly) {
   v1::ContactStep step = ThreeImpulses();
   EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: columns[2]: an empty scene has "
-                                              "no object 1;"));
+                                              "no object 1, which is unknown"));
   *step.mutable_contact_columns()->mutable_impulses() = step.columns();
   step.clear_columns();
   EXPECT_THAT(Read(step).rejection, HasSubstr("contact_columns[2]: an empty scene"));
