@@ -80,6 +80,7 @@ void StrikeForAWhile(SceneRegistry& scenes) {
   for (int step = 0; step < 60; ++step) {
     ASSERT_TRUE(stream->intake().BeginStep(0.1 * step).ok());
     stream->intake().Strike(SmallImpulse(1, 0.5 + 0.01 * step));
+    stream->intake().EndStep();
   }
 }
 
