@@ -83,7 +83,7 @@ void LogMissingChanges(const Database& database) {
   }
 }
 
-/// Logs which stored changes are missing, and removes what is not needed.
+/// Logs the stored changes that are missing. Removes unused meshes, and models beyond the budget.
 void Tidy(ModeDatabase& database, const Options& options) {
   database.models().KeepWithin(
       {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});

@@ -166,10 +166,10 @@ const char* carillon_version(void);
 const char* carillon_error(void);
 /** Returns the reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
 const char* carillon_error_reason(void);
-/** Returns the probable mistakes in the contacts of the stream that this thread has closed last, or
- * of the trace that it has rendered last. Each line is a sentence, for example about points that
- * lie far from their objects. Without a mistake the text is empty. The text is valid until this
- * thread closes a stream or renders again. */
+/** Returns the probable mistakes in the contacts of one stream or one trace: the stream that this
+ * thread has closed, or the trace that it has rendered, whichever happened later. Each line is a
+ * sentence, for example about points that lie far from their objects. Without a mistake the text is
+ * empty. The text is valid until this thread closes a stream or renders again. */
 const char* carillon_warnings(void);
 
 /** Connects to the daemon at "unix:PATH" or "HOST:PORT", or to the default daemon if `server` is

@@ -98,6 +98,8 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
   RETURN_IF_ERROR(Examine(std::span(&struck.felt, 1), added, 1));
   NoteZero(impulse.contact);
   ++impulse_count_;
+  struck.Add(added);
+  if (settings_.blows == nullptr) return absl::OkStatus();
   MixerEvent alone = struck.felt.event;
   std::ranges::transform(added,
                          std::get<SurfaceImpulse>(alone.action).impulse_newton_seconds.begin(),
@@ -105,7 +107,6 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
   BlowRecord blow;
   blow.handle = struck.felt.handle;
   AddBlow(alone, blow, struck.frame);
-  struck.Add(added);
   return absl::OkStatus();
 }
 

@@ -55,7 +55,7 @@ class StepImpulses {
 
  private:
   static constexpr size_t kMostEvents = 4096;
-  static constexpr size_t kMostObjects = 2;  // of an impulse
+  static constexpr size_t kMostObjects = 2;  // one impulse strikes at most two objects
   // An event whose place in the table is taken by a later one is not found again.
   static constexpr size_t kTableSize = 256;
   static constexpr uint16_t kNone = UINT16_MAX;
