@@ -103,7 +103,8 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
 
 struct ApiServer::State {
   State(const ApiSettings& settings, const ServedRooms& rooms, AccessTable table)
-      : grpc_log(rooms.clock, rooms.log),
+      : clock(rooms.clock),
+        grpc_log(rooms.clock, rooms.log),
         client_log(rooms.clock, rooms.log),
         access(std::move(table), rooms.clock, rooms.log),
         limits(settings.client_share),
@@ -178,6 +179,7 @@ struct ApiServer::State {
   /// database's files are lost.
   void ShowDatabase(const absl::Status& files);
 
+  const Clock& clock;
   GrpcLog grpc_log;
   LimitedLog client_log;
   AccessControl access;
@@ -237,7 +239,7 @@ absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> ApiServer::State::Crede
 
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
-  servers.emplace();
+  servers.emplace(idle_calls, clock);
   gate.emplace(RaiseConnectionLimit(), settings.client_share, &client_log);
   for (ListenAddress& address : parsed) {
     ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> credentials,

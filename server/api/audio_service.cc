@@ -35,15 +35,18 @@ absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
     grpc::CallbackServerContext* context) {
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kRendering,
-              [this, context](const Principal&, ClientPlace place) {
+              [this, context](const Principal& caller, ClientPlace place) {
+                ClientLimits& limits = daemon_.reception.limits;
                 return MakeRenderCall({.database = daemon_.database,
                                        .heads = daemon_.heads,
                                        .bodies = render_bodies_,
                                        .pool = daemon_.reception.pool,
-                                       .call_count = rendering_count_,
                                        .clock = daemon_.clock,
                                        .idle_calls = daemon_.idle_calls},
-                                      *context, std::move(place));
+                                      *context,
+                                      {.call = std::move(place),
+                                       .memory = ClientPlace(limits, Holding::kRenderingMib,
+                                                             caller.client, 0)});
               });
 }
 

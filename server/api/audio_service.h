@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <optional>
 #include <string>
 #include <utility>
@@ -62,7 +61,6 @@ class AudioService final : public RawService<v1::AudioService> {
 
   const AudioContext daemon_;
   BodyCache render_bodies_;
-  std::atomic<int> rendering_count_{0};
 };
 
 }  // namespace carillon

@@ -7,6 +7,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/block_broadcast.h"
+#include "server/base/physical_memory.h"
 #include "server/scene/scene_registry.h"
 #include "server/synthesis/mixer.h"
 
@@ -35,34 +36,62 @@ Bound BoundOf(Holding holding) {
       return {"exports", kMaxExportCount, "TOO_MANY_EXPORTS", "exports run"};
     case Holding::kBackup:
       return {"backups", kMaxBackupCount, "TOO_MANY_BACKUPS", "backups are being made"};
+    case Holding::kRenderingMib:
+      return {"MiB of renderings", MostRenderingMib(), "RENDERING_MEMORY_FULL",
+              "MiB are held by renderings"};
     case Holding::kRendering:
       break;
   }
-  return {"renderings", kMaxRenderingCount};
+  return {"renderings", kMaxRenderingCount, "TOO_MANY_RENDERINGS", "traces are being rendered"};
 }
 
 }  // namespace
 
+size_t MostRenderingMib() {
+  constexpr uint64_t kMost = 2048;
+  return static_cast<size_t>(std::min(kMost, (PhysicalBytes() / 4) >> 20U));
+}
+
 ClientPlace::~ClientPlace() {
-  if (limits_ != nullptr) limits_->GiveBack(holding_, client_);
+  if (limits_ != nullptr && count_ > 0) limits_->GiveBack(holding_, client_, count_);
+}
+
+absl::Status ClientPlace::Grow(size_t count) {
+  if (count <= count_) return absl::OkStatus();
+  RETURN_IF_ERROR(limits_->Add(holding_, client_, count - count_));
+  count_ = count;
+  return absl::OkStatus();
+}
+
+size_t ClientPlace::most() const { return limits_ == nullptr ? 0 : limits_->MostOf(holding_); }
+
+size_t ClientLimits::MostOf(Holding holding) const {
+  const size_t whole = BoundOf(holding).whole;
+  return share_ >= 1 ? whole : ShareOf(whole, share_);
 }
 
 size_t ClientLimits::ShareOf(size_t whole, double share) {
   return std::max<size_t>(1, static_cast<size_t>(static_cast<double>(whole) * share));
 }
 
-absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client) {
+absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client,
+                                               size_t count) {
+  RETURN_IF_ERROR(Add(holding, client, count));
+  return ClientPlace(*this, holding, client, count);
+}
+
+absl::Status ClientLimits::Add(Holding holding, const std::string& client, size_t count) {
   const Bound bound = BoundOf(holding);
   const MutexLock lock(&mutex_);
   auto& held = held_[static_cast<size_t>(holding)];
-  if (bound.reason != nullptr && CountAll(holding) >= bound.whole) {
+  if (bound.reason != nullptr && CountAll(holding) + count > bound.whole) {
     return Refusal(absl::StatusCode::kResourceExhausted, bound.reason,
                    absl::StrCat(bound.whole, " ", bound.all_taken, ": try again when one is done"));
   }
   const auto found = held.find(client);
-  RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 0 : found->second, 1));
-  ++held[client];
-  return ClientPlace(*this, holding, client);
+  RETURN_IF_ERROR(Check(bound.name, bound.whole, found == held.end() ? 0 : found->second, count));
+  held[client] += count;
+  return absl::OkStatus();
 }
 
 absl::Status ClientLimits::Check(absl::string_view name, size_t whole, size_t held,
@@ -87,11 +116,11 @@ size_t ClientLimits::CountAll(Holding holding) const {
   return sum;
 }
 
-void ClientLimits::GiveBack(Holding holding, const std::string& client) {
+void ClientLimits::GiveBack(Holding holding, const std::string& client, size_t count) {
   const MutexLock lock(&mutex_);
   auto& held = held_[static_cast<size_t>(holding)];
   const auto found = held.find(client);
-  if (--found->second == 0) held.erase(found);
+  if ((found->second -= count) == 0) held.erase(found);
 }
 
 }  // namespace carillon

@@ -16,11 +16,24 @@
 namespace carillon {
 
 /// The kinds of places that clients hold for a while. The daemon has a bounded number of each kind.
-enum class Holding { kScene, kContactStream, kListener, kRendering, kUpload, kExport, kBackup };
-inline constexpr size_t kHoldingCount = 7;
+enum class Holding {
+  kScene,
+  kContactStream,
+  kListener,
+  kRendering,
+  kRenderingMib,  ///< memory of renderings, in MiB
+  kUpload,
+  kExport,
+  kBackup
+};
+inline constexpr size_t kHoldingCount = 8;
 
 /// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
+
+/// Returns the memory that all renderings together may hold: a quarter of the machine's, but at
+/// most 2 GiB.
+size_t MostRenderingMib();
 
 /// Greatest number of uploads of meshes and imports of models at a time.
 inline constexpr size_t kMaxUploadCount = 64;
@@ -35,26 +48,35 @@ inline constexpr size_t kMaxBackupCount = 4;
 
 class ClientLimits;
 
-/// One scene, stream, listener, rendering, upload, export or backup of a client. The destructor
-/// gives the place back.
+/// One scene, stream, listener, rendering, upload, export or backup of a client, or several. The
+/// destructor gives the places back.
 class ClientPlace {
  public:
   ClientPlace() = default;
-  ClientPlace(ClientLimits& limits, Holding holding, std::string client)
-      : limits_(&limits), holding_(holding), client_(std::move(client)) {}
+  ClientPlace(ClientLimits& limits, Holding holding, std::string client, size_t count)
+      : limits_(&limits), holding_(holding), client_(std::move(client)), count_(count) {}
   ClientPlace(ClientPlace&& other) noexcept { *this = std::move(other); }
   ClientPlace& operator=(ClientPlace&& other) noexcept {
     std::swap(limits_, other.limits_);
     std::swap(holding_, other.holding_);
     std::swap(client_, other.client_);
+    std::swap(count_, other.count_);
     return *this;
   }
   ~ClientPlace();
+
+  /// Takes more places, so that this holds `count` of them. Nothing changes if this holds as many
+  /// already. Errors: those of ClientLimits::Take.
+  absl::Status Grow(size_t count);
+
+  /// Returns the number of places of this kind that the client may hold at most.
+  size_t most() const;
 
  private:
   ClientLimits* limits_ = nullptr;
   Holding holding_ = Holding::kScene;
   std::string client_;
+  size_t count_ = 0;
 };
 
 /// Bounds the places of one client to a share of the places of all clients together, so that no
@@ -65,10 +87,11 @@ class ClientLimits {
   /// no limit for a single client.
   explicit ClientLimits(double share) : share_(share) {}
 
-  /// Takes a place for a client. The place must not outlive the ClientLimits. Errors:
-  /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS:
-  /// all clients together have reached the greatest number at a time).
-  absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
+  /// Takes `count` places for a client. They must not outlive the ClientLimits. Errors:
+  /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_RENDERINGS, RENDERING_MEMORY_FULL,
+  /// TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS: all clients together have reached the
+  /// greatest number at a time).
+  absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client, size_t count = 1);
 
   /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names
   /// the things, such as objects, which the caller counts. Errors: ResourceExhausted
@@ -83,8 +106,10 @@ class ClientLimits {
 
  private:
   friend class ClientPlace;
+  size_t MostOf(Holding holding) const;
   size_t CountAll(Holding holding) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void GiveBack(Holding holding, const std::string& client);
+  absl::Status Add(Holding holding, const std::string& client, size_t count);
+  void GiveBack(Holding holding, const std::string& client, size_t count);
 
   const double share_;
   mutable Mutex mutex_;

@@ -81,7 +81,8 @@ void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
 
 }  // namespace
 
-GrpcServers::GrpcServers() {
+GrpcServers::GrpcServers(IdleCalls& idle_calls, const Clock& clock)
+    : idle_calls_(idle_calls), clock_(clock) {
   // Builders that are made later add health to their servers.
   grpc::EnableDefaultHealthCheckService(true);
   for (size_t i = 0; i < kCount; ++i) {
@@ -109,7 +110,7 @@ std::unique_ptr<ConnectionTaker> GrpcServers::AddTaker(
 bool GrpcServers::Start(absl::Span<const ServedService> services) {
   std::vector<std::string> names = {kHealthService};
   for (const ServedService& served : services) names.emplace_back(served.name);
-  reflection_ = MakeReflectionServices(std::move(names));
+  reflection_ = MakeReflectionServices(std::move(names), idle_calls_, clock_);
   for (const auto& builder : builders_) {
     for (const ServedService& served : services) builder->RegisterService(&served.service);
     for (const auto& service : reflection_) builder->RegisterService(service.get());

@@ -11,6 +11,8 @@
 
 #include "absl/types/span.h"
 #include "server/api/connection_gate.h"
+#include "server/api/idle_calls.h"
+#include "server/base/clock.h"
 
 namespace carillon {
 
@@ -36,7 +38,8 @@ class GrpcServers {
   /// Memory that gRPC may take for the connections of one group of addresses.
   static constexpr size_t kTcpMemoryBytes = size_t{96} << 20U;
 
-  GrpcServers();
+  /// Open calls of reflection are added to `idle_calls`, which must outlive this as `clock` must.
+  GrpcServers(IdleCalls& idle_calls, const Clock& clock);
 
   /// Cancels the calls that have not ended kGracePeriod later, and waits until all have ended.
   ~GrpcServers();
@@ -58,6 +61,8 @@ class GrpcServers {
  private:
   static constexpr std::chrono::milliseconds kGracePeriod{500};
 
+  IdleCalls& idle_calls_;
+  const Clock& clock_;
   std::vector<std::unique_ptr<grpc::Service>> reflection_;
   std::vector<std::unique_ptr<grpc::ServerBuilder>> builders_;
   std::vector<std::unique_ptr<grpc::Server>> servers_;

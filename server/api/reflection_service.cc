@@ -4,6 +4,7 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 
+#include <chrono>
 #include <map>
 #include <set>
 #include <utility>
@@ -97,25 +98,38 @@ void AnswerServices(const Contract& contract, Response& response) {
   for (const std::string& name : contract.names) answer.add_service()->set_name(name);
 }
 
-/// One call, which reads the next request when the answer to the previous one has been sent.
+/// One call, which reads the next request when the answer to the previous one has been sent. A call
+/// whose client neither asks nor reads for too long is cancelled.
 template <typename Request, typename Response>
-class ReflectionCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, Response> {
+class ReflectionCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, Response>,
+                             public IdleCall {
  public:
-  explicit ReflectionCall(const Contract& contract) : contract_(contract) {
+  ReflectionCall(const Contract& contract, grpc::CallbackServerContext& context,
+                 IdleCalls& idle_calls, const Clock& clock)
+      : contract_(contract), context_(context), idle_calls_(idle_calls), wait_(clock) {
+    idle_calls_.Add(*this);
     this->StartRead(&bytes_);
+  }
+  ~ReflectionCall() override { idle_calls_.Remove(*this); }
+
+  void EndIfIdle(std::chrono::nanoseconds limit) override {
+    if (wait_.EndIfLonger(limit)) context_.TryCancel();
   }
 
   void OnReadDone(bool ok) override {
+    if (!wait_.Resume()) return this->Finish(grpc::Status::CANCELLED);
     if (!ok) return this->Finish(grpc::Status::OK);
     ++request_count_;
     const absl::Status status = WithoutExceptions([this] { return Answer(); });
     if (!status.ok()) return this->Finish(ToGrpcStatus(status));
+    wait_.Begin();
     this->StartWrite(&response_);
   }
 
   void OnWriteDone(bool ok) override {
-    if (!ok) return this->Finish(grpc::Status::CANCELLED);
+    if (!wait_.Resume() || !ok) return this->Finish(grpc::Status::CANCELLED);
     response_ = Response();  // an open call keeps no memory for it
+    wait_.Begin();
     this->StartRead(&bytes_);
   }
 
@@ -168,6 +182,9 @@ class ReflectionCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, Re
   }
 
   const Contract& contract_;
+  grpc::CallbackServerContext& context_;
+  IdleCalls& idle_calls_;
+  ClientWait wait_;
   grpc::ByteBuffer bytes_;
   int request_count_ = 0;
   Response response_;
@@ -176,22 +193,28 @@ class ReflectionCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, Re
 template <typename Generated, typename Request, typename Response>
 class ReflectionService final : public RawService<Generated> {
  public:
-  explicit ReflectionService(std::shared_ptr<const Contract> contract)
-      : contract_(std::move(contract)) {
+  ReflectionService(std::shared_ptr<const Contract> contract, IdleCalls& idle_calls,
+                    const Clock& clock)
+      : contract_(std::move(contract)), idle_calls_(idle_calls), clock_(clock) {
     this->ReadRaw("ServerReflectionInfo", &ReflectionService::Open);
   }
 
  private:
-  grpc::ServerBidiReactor<grpc::ByteBuffer, Response>* Open(grpc::CallbackServerContext*) {
-    return new ReflectionCall<Request, Response>(*contract_);
+  grpc::ServerBidiReactor<grpc::ByteBuffer, Response>* Open(
+      grpc::CallbackServerContext* context) {
+    return new ReflectionCall<Request, Response>(*contract_, *context, idle_calls_, clock_);
   }
 
   const std::shared_ptr<const Contract> contract_;
+  IdleCalls& idle_calls_;
+  const Clock& clock_;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<grpc::Service>> MakeReflectionServices(std::vector<std::string> names) {
+std::vector<std::unique_ptr<grpc::Service>> MakeReflectionServices(std::vector<std::string> names,
+                                                                   IdleCalls& idle_calls,
+                                                                   const Clock& clock) {
   namespace v1 = grpc::reflection::v1;
   namespace v1alpha = grpc::reflection::v1alpha;
   names.emplace_back(v1::ServerReflection::service_full_name());
@@ -202,10 +225,10 @@ std::vector<std::unique_ptr<grpc::Service>> MakeReflectionServices(std::vector<s
   std::vector<std::unique_ptr<grpc::Service>> services;
   services.push_back(
       std::make_unique<ReflectionService<v1::ServerReflection, v1::ServerReflectionRequest,
-                                         v1::ServerReflectionResponse>>(contract));
+                                         v1::ServerReflectionResponse>>(contract, idle_calls, clock));
   services.push_back(std::make_unique<
                      ReflectionService<v1alpha::ServerReflection, v1alpha::ServerReflectionRequest,
-                                       v1alpha::ServerReflectionResponse>>(contract));
+                                       v1alpha::ServerReflectionResponse>>(contract, idle_calls, clock));
   return services;
 }
 

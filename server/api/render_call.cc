@@ -31,27 +31,17 @@ constexpr size_t kFramesPerMessage = 64 * OfflineRenderer::kBlockFrameCount;
 /// memory.
 class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse>, public IdleCall {
  public:
-  RenderCall(const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place)
+  RenderCall(const RenderContext& daemon, grpc::CallbackServerContext& context, RenderPlaces places)
       : StreamWriter(&daemon.pool),
-        place_(std::move(place)),
+        places_(std::move(places)),
         context_(context),
-        call_count_(daemon.call_count),
         idle_calls_(daemon.idle_calls),
         wait_(daemon.clock),
         reader_(daemon.database, daemon.heads, daemon.bodies) {
-    if (++call_count_ <= static_cast<int>(kMaxRenderingCount)) {
-      idle_calls_.Add(*this);
-      StartReading();
-      return;
-    }
-    End(Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_RENDERINGS",
-                absl::StrCat(kMaxRenderingCount,
-                             " traces are being rendered; try again when one is done")));
+    idle_calls_.Add(*this);
+    StartReading();
   }
-  ~RenderCall() override {
-    idle_calls_.Remove(*this);
-    --call_count_;
-  }
+  ~RenderCall() override { idle_calls_.Remove(*this); }
 
   void EndIfIdle(std::chrono::nanoseconds limit) override {
     if (!wait_.EndIfLonger(limit)) return;
@@ -65,8 +55,17 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
  private:
   absl::Status Take(const v1::RenderRequest& request) override {
     RETURN_IF_ERROR(reader_.Take(request));
+    RETURN_IF_ERROR(GrowMemory(reader_.held_bytes() >> 20U));
     wait_.Begin();
     return absl::OkStatus();
+  }
+
+  absl::Status GrowMemory(size_t mib) {
+    if (mib <= places_.memory.most()) return places_.memory.Grow(mib);
+    return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
+                   absl::StrCat("the trace takes over ", places_.memory.most(),
+                                " MiB, the most that the daemon has for the renderings of one "
+                                "client: render it in pieces"));
   }
 
   bool GoesOn() override { return wait_.Resume(); }
@@ -144,9 +143,8 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     }
   }
 
-  const ClientPlace place_;
+  RenderPlaces places_;
   grpc::CallbackServerContext& context_;
-  std::atomic<int>& call_count_;
   IdleCalls& idle_calls_;
   ClientWait wait_;
   std::atomic<bool> writes_{false};
@@ -160,8 +158,8 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
 }  // namespace
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* MakeRenderCall(
-    const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place) {
-  return new RenderCall(daemon, context, std::move(place));
+    const RenderContext& daemon, grpc::CallbackServerContext& context, RenderPlaces places) {
+  return new RenderCall(daemon, context, std::move(places));
 }
 
 }  // namespace carillon

@@ -3,8 +3,6 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <atomic>
-
 #include "carillon/v1/audio_service.pb.h"
 #include "server/api/client_limits.h"
 #include "server/api/idle_calls.h"
@@ -22,15 +20,19 @@ struct RenderContext {
   HeadStore& heads;
   BodyCache& bodies;
   ThreadPool& pool;
-  /// Number of Render calls that are running.
-  std::atomic<int>& call_count;
   const Clock& clock;
   IdleCalls& idle_calls;
 };
 
-/// Makes a call of AudioService.Render, which holds `place` and deletes itself when it is done. The
-/// call is added to the idle calls of `daemon`, whose parts must outlive the call.
+/// The places that a rendering holds.
+struct RenderPlaces {
+  ClientPlace call;
+  ClientPlace memory;  ///< of the kind kRenderingMib; grows with the trace
+};
+
+/// Makes a call of AudioService.Render, which holds `places` and deletes itself when it is done.
+/// The call is added to the idle calls of `daemon`, whose parts must outlive the call.
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* MakeRenderCall(
-    const RenderContext& daemon, grpc::CallbackServerContext& context, ClientPlace place);
+    const RenderContext& daemon, grpc::CallbackServerContext& context, RenderPlaces places);
 
 }  // namespace carillon

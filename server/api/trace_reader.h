@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -29,6 +30,9 @@ class TraceReader {
   /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing
   /// was sent).
   absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
+
+  /// Returns the memory that the trace takes so far.
+  size_t held_bytes() const { return renderer_ ? renderer_->held_bytes() : 0; }
 
   uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }
   uint32_t channel_count() const { return settings_->channel_count; }

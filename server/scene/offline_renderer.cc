@@ -25,6 +25,9 @@ constexpr float kQuiet = 1e-4F;
 /// while.
 constexpr double kQuietS = 0.25;
 constexpr size_t kOfflineQueueCapacity = 65536;
+/// Memory that an object takes beside its model, and for each of its modes that sound.
+constexpr size_t kObjectBytes = 4096;
+constexpr size_t kModeBytes = 64;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
   // Offline blocks have no deadline, so a block takes all its events.
@@ -51,7 +54,7 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<Blo
 }
 
 /// Returns the longest time, in frames, by which a contact begins before its impulse.
-uint64_t LongestContactFrames(std::span<const MixerEvent> events, double sample_rate_hz) {
+uint64_t LongestContactFrames(const std::deque<MixerEvent>& events, double sample_rate_hz) {
   float longest_s = 0;
   for (const MixerEvent& event : events) {
     if (event.impulse() == nullptr) continue;
@@ -118,14 +121,23 @@ absl::Status OfflineRenderer::AddObject(uint32_t handle, std::shared_ptr<const M
   if (object.transfer == nullptr && properties.radiation == RadiationModel::kDefault) {
     ++summary_.paper_coupling_object_count;
   }
+  object_bytes_ += kObjectBytes + object.mode_count * kModeBytes;
   return scene_.Insert(handle, std::move(object));
+}
+
+size_t OfflineRenderer::held_bytes() const {
+  return object_bytes_ + events().size() * sizeof(MixerEvent) +
+         blows_.capacity() * sizeof(BlowRecord);
 }
 
 size_t OfflineRenderer::Render(std::span<float> samples) {
   if (!begun_) {
     intake_.Finish();
     // The sort is stable, because live events of one sample keep their order, too.
-    std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
+    // A copy of the events is made only for a sort that is needed.
+    if (!std::ranges::is_sorted(events(), {}, &MixerEvent::FirstSample)) {
+      std::ranges::stable_sort(events(), {}, &MixerEvent::FirstSample);
+    }
     const auto last = std::find_if_not(events().rbegin(), events().rend(), IsMove);
     contact_count_ = static_cast<size_t>(events().rend() - last);
     ahead_frame_count_ = LongestContactFrames(events(), mixer_.settings().sample_rate_hz);

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <span>
 #include <thread>
@@ -81,6 +83,10 @@ class OfflineRenderer {
   /// The intake that takes the steps of the simulation.
   ContactIntake& intake() { return intake_; }
 
+  /// Returns the memory that the objects and the steps take so far, bytes. Models are shared with
+  /// others and not counted.
+  size_t held_bytes() const;
+
   /// Renders whole blocks of kBlockFrameCount frames into `samples`, channels interleaved, until no
   /// further block fits or the sound ends. `samples` must hold at least one block. Returns the
   /// number of frames that belong to the sound, which is zero after its end.
@@ -100,7 +106,9 @@ class OfflineRenderer {
     uint64_t frame() const override { return first_frame_; }
     void Push(const MixerEvent& event) override { events.push_back(event); }
 
-    std::vector<MixerEvent> events;  // sorted by time once rendering has begun
+    // Sorted by time once rendering has begun. A deque, unlike a vector, never holds two copies of
+    // the events while it grows.
+    std::deque<MixerEvent> events;
 
    private:
     const uint64_t first_frame_;
@@ -108,8 +116,8 @@ class OfflineRenderer {
 
   OfflineRenderer(const OfflineSettings& settings, BodyCache& bodies, TransferStore* transfers);
 
-  std::vector<MixerEvent>& events() { return target_.events; }
-  const std::vector<MixerEvent>& events() const { return target_.events; }
+  std::deque<MixerEvent>& events() { return target_.events; }
+  const std::deque<MixerEvent>& events() const { return target_.events; }
   void PushEventsBefore(uint64_t frame);
   size_t RenderBlocks(std::span<float> samples);
   size_t CountBlocks(size_t most) const;
@@ -128,6 +136,7 @@ class OfflineRenderer {
   std::vector<BlowRecord> blows_;
   ContactIntake intake_;
   size_t pushed_count_ = 0;
+  size_t object_bytes_ = 0;
   size_t contact_count_ = 0;  // number of events up to the last that is not a move
   uint64_t ahead_frame_count_ = 0;
   uint64_t quiet_frame_count_ = 0;

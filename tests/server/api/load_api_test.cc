@@ -56,5 +56,41 @@ TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
   ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TRACE_TOO_LARGE");
 }
 
+/// A daemon of whose memory for renderings one client has very little.
+class LittleMemoryApi : public ServedDaemon {
+ protected:
+  LittleMemoryApi() : ServedDaemon({.client_share = 0.001}) {}
+};
+
+TEST_F(LittleMemoryApi, ATraceThatTakesMoreThanTheClientsShareIsRefused) {
+  grpc::ClientContext context;
+  const auto stream = audio->Render(&context);
+  v1::RenderRequest request;
+  request.mutable_settings()->set_tail_s(0.2);
+  stream->Write(request);
+  request.mutable_record()->mutable_header()->set_format_version(1);
+  stream->Write(request);
+  v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
+  object.set_handle(1);
+  object.set_modal_model(ImportSmallModel());
+  *object.mutable_material() = SmallMaterial();
+  stream->Write(request);
+  for (int step = 0; step < 100; ++step) {
+    v1::ContactStep& message = *request.mutable_record()->mutable_step();
+    message.set_time_s(step);
+    message.clear_impulses();
+    for (int i = 0; i < 1000; ++i) {
+      *message.add_impulses() = Strike(1);
+      message.mutable_impulses(i)->set_time_offset_s(1e-3 * i);  // equal ones would be added up
+    }
+    if (!stream->Write(request)) break;
+  }
+  v1::RenderResponse response;
+  EXPECT_FALSE(stream->Read(&response));
+  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TRACE_TOO_LARGE");
+  while (server().clients().renderings > 0) {
+  }
+}
+
 }  // namespace
 }  // namespace carillon
