@@ -37,16 +37,16 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::Ren
   return Open(*context, daemon_.reception, Role::kStrike, Holding::kRendering,
               [this, context](const Principal& caller, ClientPlace place) {
                 ClientLimits& limits = daemon_.reception.limits;
-                return MakeRenderCall({.database = daemon_.database,
-                                       .heads = daemon_.heads,
-                                       .bodies = render_bodies_,
-                                       .pool = daemon_.reception.pool,
-                                       .clock = daemon_.clock,
-                                       .idle_calls = daemon_.idle_calls},
-                                      *context,
-                                      {.call = std::move(place),
-                                       .memory = ClientPlace(limits, Holding::kRenderingMib,
-                                                             caller.client, 0)});
+                return MakeRenderCall(
+                    {.database = daemon_.database,
+                     .heads = daemon_.heads,
+                     .bodies = render_bodies_,
+                     .pool = daemon_.reception.pool,
+                     .clock = daemon_.clock,
+                     .idle_calls = daemon_.idle_calls},
+                    *context,
+                    {.call = std::move(place),
+                     .memory = ClientPlace(limits, Holding::kRenderingMib, caller.client, 0)});
               });
 }
 

@@ -200,8 +200,7 @@ class ReflectionService final : public RawService<Generated> {
   }
 
  private:
-  grpc::ServerBidiReactor<grpc::ByteBuffer, Response>* Open(
-      grpc::CallbackServerContext* context) {
+  grpc::ServerBidiReactor<grpc::ByteBuffer, Response>* Open(grpc::CallbackServerContext* context) {
     return new ReflectionCall<Request, Response>(*contract_, *context, idle_calls_, clock_);
   }
 
@@ -225,10 +224,12 @@ std::vector<std::unique_ptr<grpc::Service>> MakeReflectionServices(std::vector<s
   std::vector<std::unique_ptr<grpc::Service>> services;
   services.push_back(
       std::make_unique<ReflectionService<v1::ServerReflection, v1::ServerReflectionRequest,
-                                         v1::ServerReflectionResponse>>(contract, idle_calls, clock));
-  services.push_back(std::make_unique<
-                     ReflectionService<v1alpha::ServerReflection, v1alpha::ServerReflectionRequest,
-                                       v1alpha::ServerReflectionResponse>>(contract, idle_calls, clock));
+                                         v1::ServerReflectionResponse>>(contract, idle_calls,
+                                                                        clock));
+  services.push_back(
+      std::make_unique<
+          ReflectionService<v1alpha::ServerReflection, v1alpha::ServerReflectionRequest,
+                            v1alpha::ServerReflectionResponse>>(contract, idle_calls, clock));
   return services;
 }
 

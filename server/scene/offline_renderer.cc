@@ -26,7 +26,7 @@ constexpr float kQuiet = 1e-4F;
 constexpr double kQuietS = 0.25;
 constexpr size_t kOfflineQueueCapacity = 65536;
 /// Memory that an object takes beside its model, and for each of its modes that sound.
-constexpr size_t kObjectBytes = 4096;
+constexpr size_t kObjectBytes = size_t{40} << 10U;
 constexpr size_t kModeBytes = 64;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, SectionThreads& threads) {
