@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NoReturn, Optional
@@ -102,6 +103,14 @@ def expect(given: Any, kind: type, name: str) -> None:
     """Raises TypeError if an argument is not of the class of this package."""
     if not isinstance(given, kind):
         raise TypeError(f"{name} is of type {type(given).__name__}; it must be a carillon.{kind.__name__}")
+
+
+def number(value: Any, name: str, meaning: str) -> float:
+    """Converts to a number, and no text. Raises ValueError that says what the number means if that is impossible."""
+    if not isinstance(value, (str, bytes)):
+        with contextlib.suppress(TypeError, ValueError):
+            return float(value)
+    refuse(value, name, meaning)
 
 
 def numbers(values: Any, name: str, meaning: str) -> numpy.ndarray:

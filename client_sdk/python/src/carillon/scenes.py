@@ -259,6 +259,7 @@ class ContactStream:
         self._is_closed = False
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
         self.dropped_step_count = 0
+        self._step_count, self._time_s = 0, 0.0
         self._answers = scene.client.contacts_stub.StreamContacts(self._sent(start))
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -293,20 +294,23 @@ class ContactStream:
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
-        loads of a simulator that knows them; poses of objects, and of the listener."""
+        loads of a simulator that knows them; poses of objects, and of the listener. Errors as those of `send`."""
         for columns in (contacts, impulses, forces, poses):
             _refuse_other_scenes(columns, self._start.scene)
         self.send(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
 
     def send(self, step: contact_pb2.ContactStep) -> None:
-        """Sends a message of contact.proto. Raises CarillonError if the stream has failed, or has been closed
-        (CONTACT_STREAM_ENDED)."""
+        """Sends a message of contact.proto. Raises CarillonError if the stream has failed or has been closed
+        (CONTACT_STREAM_ENDED), and if the step's time is not finite or goes back (INVALID_STREAM); such a step is not
+        sent, and the stream can go on."""
         if self._is_closed:
             raise errors.CarillonError("CONTACT_STREAM_ENDED", "this stream has been closed, so that the step would "
                                        "not sound; open another one by Scene.stream")
         if self._error:
             _open_streams.streams.discard(self)
             raise errors.from_rpc(self._error, self._server)
+        contacts.refuse_time(step.time_s, self._step_count, self._time_s, "open another stream for another run")
+        self._step_count, self._time_s = self._step_count + 1, step.time_s
         if self._steps.qsize() >= MOST_WAITING:
             with contextlib.suppress(queue.Empty):  # the thread that sends may have taken it meanwhile
                 self._steps.get_nowait()
