@@ -233,7 +233,7 @@ export class Scene {
 export class ContactStream {
   /** The daemon's newest answer, with the counts so far. */
   readonly report?: StreamContactsResponse__Output;
-  /** Steps that were not sent: the oldest ones, when 4096 waited. */
+  /** Steps that were not sent: the oldest ones, when 4096 waited. The warning of `close` tells their number, too. */
   readonly droppedStepCount: number;
   /** How many contacts came too late for their time so far, and sounded at once. */
   readonly lateCount: number;
@@ -245,8 +245,10 @@ export class ContactStream {
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;
   /**
-   * Sends a step. The promise gives the network a turn. Throws CarillonError if the stream has failed, or has been
-   * closed (CONTACT_STREAM_ENDED).
+   * Sends a step. Await the promise, which gives the network a turn: a loop that never awaits anything sends nothing
+   * before it ends, and of more than 4096 steps that wait the oldest are dropped (droppedStepCount). Throws CarillonError
+   * if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time is not finite or goes back
+   * (INVALID_STREAM); such a step is not sent, and the stream can go on.
    */
   step(time: number, content?: StepContent): Promise<void>;
   /**

@@ -3,7 +3,8 @@
 
 const util = require('util');
 const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { countRows, frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
+const { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+  toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
@@ -191,6 +192,8 @@ class ContactStream {
         resolve();
       });
     });
+    this.stepCount = 0; // steps that `step` has taken, also those that were dropped
+    this.time = 0; // of the newest of them
     this.waiting = [];
     this.handedCount = 0; // steps that gRPC has not sent yet
     this.isFull = !this.call.write({ start });
@@ -256,9 +259,10 @@ class ContactStream {
   }
 
   /**
-   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed, or has been closed
-   * (CONTACT_STREAM_ENDED). The promise gives the network a turn: a loop that never awaits anything sends nothing before
-   * it ends.
+   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed or has been closed
+   * (CONTACT_STREAM_ENDED), and if the time is not finite or goes back (INVALID_STREAM); such a step is not sent, and the
+   * stream can go on. The promise gives the network a turn: a loop that never awaits anything sends nothing before it
+   * ends, and of more than 4096 steps that wait the oldest are dropped and counted in `droppedStepCount`.
    */
   step(time, content) {
     if (this.isClosing) {
@@ -269,11 +273,15 @@ class ContactStream {
     for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
       refuseOtherScenes(rows, this.start.scene);
     }
+    const made = makeStep(time, content);
+    refuseTime(time, this.stepCount, this.time, 'open another stream for another run');
+    this.stepCount += 1;
+    this.time = time;
     if (this.waiting.length >= MOST_WAITING) {
       this.waiting.shift();
       this.droppedStepCount += 1;
     }
-    this.waiting.push(makeStep(time, content));
+    this.waiting.push(made);
     this.write();
     return new Promise(setImmediate);
   }

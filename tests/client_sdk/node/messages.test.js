@@ -35,6 +35,13 @@ function told(counts, frame = "each object's own frame", dropped = 0) {
   return warningsOf(() => warnOfStream({ scheduling_delay_s: 0.02, ...counts }, frame, dropped));
 }
 
+/** A stream whose steps all wait, as if the network took none. */
+function stoppedStream() {
+  const stream = scene.stream({ step: 1 / 240 });
+  stream.isFull = true;
+  return stream;
+}
+
 function refused(expected, content) {
   assert.throws(() => new carillon.Trace({ step: 1 / 240 }).step(0, content), (error) => error.message.includes(expected)
     || assert.fail(error.message));
@@ -250,6 +257,34 @@ test('a step whose time is not finite or goes back is refused, and the trace can
   assert.throws(() => trace.step(1.5), { reason: 'INVALID_STREAM', message: /goes back from 2 s to 1\.5 s at step 2;/ });
   trace.step(2);
   assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
+});
+
+test('a step of a stream whose time is not finite or goes back is refused at once, and the stream can go on', async () => {
+  const stream = stoppedStream();
+  for (const time of [NaN, Infinity]) {
+    assert.throws(() => stream.step(time), { reason: 'INVALID_STREAM', message: /the time of step 0 is/ });
+  }
+  for (const time of [null, '0.1']) assert.throws(() => stream.step(time), /^TypeError: time is .* the simulation time/);
+  for (const time of [-1, 2, 2]) stream.step(time);
+  assert.throws(() => stream.step(1.5), { reason: 'INVALID_STREAM',
+    message: /goes back from 2 s to 1\.5 s at step 3; open another stream for another run$/ });
+  stream.step(3);
+  assert.deepEqual(stream.waiting.map((step) => step.time_s), [-1, 2, 2, 3]);
+  stream.isFull = false;
+  await assert.rejects(stream.close(), carillon.ServerUnavailable);
+});
+
+test('a step that is refused makes no other step lost', async () => {
+  const stream = stoppedStream();
+  for (let i = 0; i < 4096; i += 1) stream.step(i);
+  assert.equal(stream.waiting.length, 4096);
+  assert.throws(() => stream.step(4096, { contact: [] }), TypeError);
+  assert.throws(() => stream.step(0), { reason: 'INVALID_STREAM' });
+  assert.equal(stream.droppedStepCount, 0);
+  stream.step(4096);
+  assert.equal(stream.droppedStepCount, 1);
+  stream.isFull = false;
+  await assert.rejects(stream.close(), carillon.ServerUnavailable);
 });
 
 test('an empty name of a model is refused with the name of the argument', async () => {
