@@ -117,11 +117,14 @@ function choice(given, words, prefix, name) {
   return prefix + word.toUpperCase();
 }
 
+const GAIN = 'a number, and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels';
+
 /** Throws a TypeError if one of the values, by their names, is given and is no number. */
 function refuseNoNumbers(values, where) {
   for (const [name, value] of Object.entries(values)) {
     const isAbsent = value === undefined || value === null;
-    if (!isAbsent && typeof value !== 'number') refuse(value, `${name} of ${where}`, 'a number');
+    const wanted = name === 'gain' ? GAIN : 'a number';
+    if (!isAbsent && typeof value !== 'number') refuse(value, `${name} of ${where}`, wanted);
   }
 }
 

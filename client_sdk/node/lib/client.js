@@ -222,7 +222,10 @@ class Client {
       (near === undefined ? '' : `; did you mean '${near}'?`));
   }
 
-  /** Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both. */
+  /**
+   * Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level as it
+   * is, and 10 ** (x / 20) stands for x decibels. Returns both.
+   */
   setVolume(volume) {
     refuseUnknown(volume, ['gain', 'muted'], 'setVolume');
     const { gain, muted } = volume;

@@ -119,6 +119,7 @@ export interface StreamSettings {
 export interface ObjectSettings {
   material?: Material;
   size?: number;
+  /** Linear: 1 leaves the level as it is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels. */
   gain?: number;
   pose?: Pose;
   handle?: number;
@@ -217,7 +218,10 @@ export class Scene {
   /** Adds an object. Without a material it gets the one that the model was asked for with. */
   add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
   objects(): Promise<SoundingObject[]>;
-  /** Changes the volume, which glides within 30 ms. `solo`: of your scenes, only those with this flag are heard. */
+  /**
+   * Changes the volume, which glides within 30 ms. The gain is linear: 1 leaves the level as it is, and 10 ** (x / 20)
+   * stands for x decibels. `solo`: of your scenes, only those with this flag are heard.
+   */
   update(volume: { gain?: number; muted?: boolean; solo?: boolean }): Promise<Scene__Output>;
   /** Fades out all that sounds in the scene. Later contacts sound. */
   stop(): Promise<void>;
@@ -302,7 +306,10 @@ export class Client {
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
   /** Begins to record what the daemon plays. Returns once it does. */
   listen(request?: ListenRequest): Promise<Recording>;
-  /** Changes the linear gain of the daemon's output, or mutes it, without a click. */
+  /**
+   * Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level as it
+   * is, and 10 ** (x / 20) stands for x decibels.
+   */
   setVolume(volume: { gain?: number; muted?: boolean }): Promise<UpdateMixerResponse__Output>;
   /** Fades out all that sounds in your scenes. Returns their number. */
   stopAll(): Promise<number>;

@@ -43,7 +43,10 @@ class SoundingObject {
     warnOfContacts(stream.findings, "the object's own frame");
   }
 
-  /** Changes what is given; a pose is reached after `glide` seconds. */
+  /**
+   * Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it is, 0.5 is
+   * 6 dB less, and 10 ** (x / 20) stands for x decibels.
+   */
   async update(changes) {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
     const { material, size, gain, pose, glide = 0, radiation } = changes;
@@ -97,7 +100,10 @@ class Scene {
       ...given('gain', gain), ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
-  /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
+  /**
+   * Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. Its gain is
+   * linear, as in SoundingObject.update.
+   */
   async add(model, settings = {}) {
     const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }, 'add'));
     return new SoundingObject(this, answer.object);
@@ -110,8 +116,9 @@ class Scene {
   }
 
   /**
-   * Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes only those
-   * with this flag are heard. Returns the scene's state.
+   * Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x decibels; muted,
+   * so that the scene rings on unheard; solo, so that of your scenes only those with this flag are heard. Returns the
+   * scene's state.
    */
   async update(volume) {
     refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');

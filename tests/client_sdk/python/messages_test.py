@@ -3,6 +3,7 @@
 """What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
 
 import asyncio
+import functools
 import threading
 import unittest
 import warnings
@@ -171,6 +172,19 @@ class RefusalsTest(MessagesTest):
         self.refused("handle of add is -1; it must be a whole number, zero or more", scene.add, "modalModels/1",
                      handle=-1)
         self.refused("material is of type int", scene.add, "modalModels/1", 7)
+
+    def test_a_gain_that_is_no_number_is_refused_as_linear(self):
+        scene = carillon.Scene(self.c, "scenes/1")
+        bell = carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(handle=1))
+        for where, call in (("update", bell.update), ("update", scene.update), ("set_volume", self.c.set_volume),
+                            ("scene", self.c.scene), ("add", functools.partial(scene.add, "modalModels/1")),
+                            ("add", functools.partial(carillon.Trace().add, "modalModels/1"))):
+            self.refused(f"gain of {where} is '0.5'; it must be a number, and is linear: 1 leaves the level as it is, "
+                         "and 10 ** (x / 20) stands for x decibels", call, gain="0.5")
+        self.refused("size of update is 'big'; it must be a number", bell.update, size="big")
+        self.refused("muted of update is 'no'; it must be True or False", scene.update, muted="no")
+        self.refused("glide is '1'; it must be seconds", bell.update, glide="1")
+        self.refused("glide is '1'; it must be seconds", scene.move_listener, POINT, "1")
 
     def test_columns_are_refused_by_their_names_with_unit_and_frame(self):
         contacts = carillon.Contacts

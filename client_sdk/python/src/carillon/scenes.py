@@ -64,11 +64,12 @@ class SoundingObject:
     def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
                gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0,
                radiation: Optional[materials.Radiation] = None) -> None:
-        """Changes what is given; a pose is reached after `glide` seconds."""
-        request = scene_service_pb2.UpdateObjectRequest(
+        """Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it
+        is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels."""
+        request = checks.message(scene_service_pb2.UpdateObjectRequest, "update", dict(
             name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
-            pose=None if pose is None else contacts.to_pose(pose), glide_s=glide,
-            radiation=materials.to_radiation(radiation))
+            pose=None if pose is None else contacts.to_pose(pose), glide_s=checks.number(glide, "glide", "seconds"),
+            radiation=materials.to_radiation(radiation)))
         client = self.scene.client
         with errors.translated(client.server):
             self.message = client.scenes_stub.UpdateObject(request).object
@@ -117,7 +118,8 @@ class Scene:
     def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
             radiation: Optional[materials.Radiation] = None) -> SoundingObject:
-        """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
+        """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with.
+        `gain` is linear, as in SoundingObject.update."""
         request = self._request(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
@@ -138,13 +140,11 @@ class Scene:
 
     def update(self, *, gain: Optional[float] = None, muted: Optional[bool] = None,
                solo: Optional[bool] = None) -> scene_service_pb2.Scene:
-        """Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes
-        only those with this flag are heard. Changes glide within 30 ms. Returns the scene's state."""
-        request = scene_service_pb2.UpdateSceneRequest(name=self.name, gain=gain)
-        if muted is not None:
-            request.muted = muted
-        if solo is not None:
-            request.solo = solo
+        """Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x
+        decibels; muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are
+        heard. Changes glide within 30 ms. Returns the scene's state."""
+        request = checks.message(scene_service_pb2.UpdateSceneRequest, "update", dict(
+            name=self.name, gain=gain, muted=muted, solo=solo))
         with errors.translated(self.client.server):
             return self.client.scenes_stub.UpdateScene(request).scene
 
@@ -171,7 +171,8 @@ class Scene:
 
     def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
         """Moves the listener, within `glide` seconds."""
-        request = scene_service_pb2.UpdateListenerRequest(scene=self.name, pose=contacts.to_pose(pose), glide_s=glide)
+        request = scene_service_pb2.UpdateListenerRequest(
+            scene=self.name, pose=contacts.to_pose(pose), glide_s=checks.number(glide, "glide", "seconds"))
         with errors.translated(self.client.server):
             self.client.scenes_stub.UpdateListener(request)
 

@@ -37,7 +37,7 @@ class Trace:
     def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, label: str = "", handle: Optional[int] = None,
             radiation: Optional[materials.Radiation] = None) -> int:
-        """Adds an object, which is there from the beginning. Returns its handle."""
+        """Adds an object, which is there from the beginning, with a linear `gain`. Returns its handle."""
         handle = handle or 1 + max((item.handle for item in self.objects), default=0)
         name, message = materials.named(model, material)
         self.objects.append(checks.message(contact_trace_pb2.ContactTraceObject, "add", dict(
