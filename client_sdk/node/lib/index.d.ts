@@ -274,6 +274,11 @@ export interface JobFilters {
   label_contains?: string;
 }
 
+/** What a model is asked for with beside its material. */
+export type ModelRequest = Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
+  unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number; onProgress?: (job: Job__Output) => void;
+};
+
 /** A connection. */
 export class Client {
   readonly server: string;
@@ -286,10 +291,9 @@ export class Client {
    * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates, by
    * name or in metres; `accuracy` the largest estimated error of a frequency, such as 0.01 for 1 %.
    */
-  createModel(mesh: Mesh, request: Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
-    material: Material; unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number;
-    onProgress?: (job: Job__Output) => void;
-  }): Promise<Model>;
+  createModel(mesh: Mesh, request: ModelRequest & { material: Material }): Promise<Model>;
+  /** The same with the name of a material before the rest. */
+  createModel(mesh: Mesh, material: string, request?: ModelRequest): Promise<Model>;
   /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
   model(text: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;

@@ -2,7 +2,7 @@
 'use strict';
 
 const util = require('util');
-const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
+const { counted, refuseNoNumbers, refuseNoObject, refuseUnknown } = require('./checks');
 const { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
   toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
@@ -105,6 +105,7 @@ class Scene {
    * linear, as in SoundingObject.update.
    */
   async add(model, settings = {}) {
+    refuseNoObject(settings, OBJECT_KEYS, 'add');
     const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }, 'add'));
     return new SoundingObject(this, answer.object);
   }

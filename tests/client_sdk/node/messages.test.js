@@ -177,6 +177,27 @@ test('a wrong word or kind of value is refused by its name', async () => {
   await assert.rejects(c.createModel(mesh), /material is undefined; it must be a name such as 'oak'/);
 });
 
+test('the name of a material may come alone or before the rest of a request', async () => {
+  for (const words of [['oak'], ['oak', { size: 2 }], [{ material: 'oak', size: 2 }]]) {
+    await assert.rejects(c.createModel(mesh, ...words), carillon.ServerUnavailable);
+  }
+  await assert.rejects(c.createModel(mesh, 'oak', { unti: 'mm' }), /createModel has no "unti"; did you mean "unit"\?/);
+  for (const words of [['oak', { material: 'oak' }], [{ material: 'oak' }, { size: 2 }]]) {
+    await assert.rejects(c.createModel(mesh, ...words), /two materials or requests; .* createModel\(mesh, 'oak', \{/);
+  }
+});
+
+test('what is no object where keys are wanted is refused', async () => {
+  for (const [call, wanted] of [[() => c.createModel(mesh, 5), "createModel is given 5; give an object, such as { material:"],
+    [() => c.createModel(mesh, 'oak', 2), 'createModel is given 2'], [() => c.createModel(mesh, null), 'is given null'],
+    [() => scene.add('modalModels/1', 'oak'), "add is given 'oak'; give an object, such as { material: ... }"],
+    [async () => new carillon.Trace().add('modalModels/1', 'oak'), "add is given 'oak'; give an object"],
+    [() => bell.update('louder'), "update is given 'louder'; give an object, such as { material: ... }"],
+    [async () => new carillon.Trace().step(0, { impulses: [7] }), 'impulses[0] is given 7']]) {
+    await assert.rejects(call, (error) => error.message.includes(wanted) || assert.fail(error.message));
+  }
+});
+
 test('contacts are refused by their names, with unit and frame', async () => {
   const own = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
   refused(`point of contacts[1] is [ 0, 0 ]; it must be [x, y, z]: metres ${own}`,
