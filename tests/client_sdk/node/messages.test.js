@@ -367,6 +367,19 @@ test('refusals of the daemon have the names of the caller', () => {
   }
 });
 
+test('a remedy is told as createModel takes it', async () => {
+  for (const [field, value, expected] of [
+    ['settings.mesh.repair', 'true', 'settings: { mesh: { repair: true } }'],
+    ['settings.metres_per_unit', '1', 'settings: { metres_per_unit: 1 }'],
+    ['max_frequency_hz', '5000', 'max_frequency_hz: 5000']]) {
+    const { message } = fromInfo({ reason: 'INVALID', message: 'x', remedies: [{ field, value }] });
+    assert.equal(message, `INVALID: x; it may help to call createModel with ${expected}`);
+    // The words can be pasted into a call, which refuses no name of them.
+    const request = new Function(`return { ${expected} }`)();
+    await assert.rejects(c.createModel(mesh, 'oak', request), carillon.ServerUnavailable);
+  }
+});
+
 test('all that a user meets is shown in one short line', () => {
   const trace = new carillon.Trace();
   trace.add('modalModels/1');

@@ -297,6 +297,17 @@ class RefusalsTest(MessagesTest):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
 
+    def test_a_remedy_is_told_as_create_model_takes_it(self):
+        for field, value, expected in (("settings.mesh.repair", "true", 'settings={"mesh": {"repair": True}}'),
+                                       ("settings.metres_per_unit", "1", 'settings={"metres_per_unit": 1}'),
+                                       ("max_frequency_hz", "5000", "max_frequency_hz=5000")):
+            info = error_pb2.ErrorInfo(reason="INVALID", message="x", remedies=[{"field": field, "value": value}])
+            self.assertEqual(carillon.errors.from_info(info).message,
+                             f"x; it may help to call create_model with {expected}")
+            # The words can be pasted into a call, which refuses no name of them.
+            with self.assertRaises(carillon.ServerUnavailable):
+                self.c.create_model(MESH, "oak", **eval(f"dict({expected})"))
+
 
 class WaitingTest(MessagesTest):
     def test_progress_says_why_a_job_waits(self):
