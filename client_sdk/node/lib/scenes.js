@@ -193,7 +193,10 @@ class ContactStream {
       this.call.on('data', (answer) => { this.report = answer; });
       this.call.on('error', (error) => {
         this.error = fromCall(error, client.server);
-        if (client.isClosed && !this.isClosing) warnOfOpenStream(start.scene);
+        if (client.isClosed && !this.isClosing) {
+          warnOfOpenStream(start.scene);
+          warnOfStream(this.report ?? {}, frameInWords(start.frame), this.droppedStepCount);
+        }
       });
       this.call.on('close', () => {
         client.openCalls.delete(this.call);
