@@ -3,7 +3,8 @@
 
 const util = require('util');
 const { defaultServer } = require('./address');
-const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObject, refuseUnknown } = require('./checks');
+const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObject,
+  refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
@@ -55,8 +56,8 @@ function requestFor(given, more) {
   const [request, rest] = typeof given === 'string' ? [{ material: given }, more] : [given, undefined];
   for (const object of [request, rest]) refuseNoObject(object, ['material'], 'createModel');
   if (more !== rest || rest?.material !== undefined) {
-    throw new TypeError("createModel is given two materials or requests; give createModel(mesh, { material: 'oak', ... }) " +
-      "or createModel(mesh, 'oak', { ... })");
+    throw new TypeError('createModel is given two materials or requests; give createModel(mesh, { material: ' +
+      "'oak', ... }) or createModel(mesh, 'oak', { ... })");
   }
   return { ...rest, ...request };
 }

@@ -239,15 +239,17 @@ function makeStep(time, own) {
 }
 
 /**
- * Throws CarillonError (INVALID_STREAM) if step `number` of a run, counted from zero, cannot have the time after that of
- * the step before, both in seconds. `repair` says what another run needs.
+ * Throws CarillonError (INVALID_STREAM) if step `number` of a run, counted from zero, cannot have the time after that
+ * of the step before, both in seconds. `repair` says what another run needs.
  */
 function refuseTime(time, number, before, repair) {
   if (!Number.isFinite(time)) {
-    throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in seconds`);
+    throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
+      'seconds');
   }
   if (number && time < before) {
-    throw new CarillonError('INVALID_STREAM', `time goes back from ${before} s to ${time} s at step ${number}; ${repair}`);
+    throw new CarillonError('INVALID_STREAM', `time goes back from ${before} s to ${time} s at step ${number}; ` +
+      repair);
   }
 }
 
@@ -277,4 +279,5 @@ function frameInWords(frame) {
   return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
 }
 
-module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle, toPose };
+module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+  toPose };

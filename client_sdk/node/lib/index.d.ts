@@ -235,7 +235,10 @@ export class Scene {
 
 /** Sends the contacts of each step. */
 export class ContactStream {
-  /** The daemon's newest answer, with the counts so far. */
+  /**
+   * The daemon's newest answer, with the counts so far. It counts an impulse as accepted before it sounds: one that is
+   * due after the scene is deleted is never heard. Wait for `ahead_s`, in seconds, after the end of the stream.
+   */
   readonly report?: StreamContactsResponse__Output;
   /** Steps that were not sent: the oldest ones, when 4096 waited. The warning of `close` tells their number, too. */
   readonly droppedStepCount: number;
@@ -250,9 +253,9 @@ export class ContactStream {
   readonly rejection?: CarillonError;
   /**
    * Sends a step. Await the promise, which gives the network a turn: a loop that never awaits anything sends nothing
-   * before it ends, and of more than 4096 steps that wait the oldest are dropped (droppedStepCount). Throws CarillonError
-   * if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time is not finite or goes back
-   * (INVALID_STREAM); such a step is not sent, and the stream can go on.
+   * before it ends, and of more than 4096 steps that wait the oldest are dropped (droppedStepCount). Throws
+   * CarillonError if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time is not finite or
+   * goes back (INVALID_STREAM); such a step is not sent, and the stream can go on.
    */
   step(time: number, content?: StepContent): Promise<void>;
   /**

@@ -44,8 +44,8 @@ class SoundingObject {
   }
 
   /**
-   * Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it is, 0.5 is
-   * 6 dB less, and 10 ** (x / 20) stands for x decibels.
+   * Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it is, 0.5
+   * is 6 dB less, and 10 ** (x / 20) stands for x decibels.
    */
   async update(changes) {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
@@ -101,8 +101,8 @@ class Scene {
   }
 
   /**
-   * Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. Its gain is
-   * linear, as in SoundingObject.update.
+   * Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. Its gain
+   * is linear, as in SoundingObject.update.
    */
   async add(model, settings = {}) {
     refuseNoObject(settings, OBJECT_KEYS, 'add');
@@ -117,9 +117,9 @@ class Scene {
   }
 
   /**
-   * Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x decibels; muted,
-   * so that the scene rings on unheard; solo, so that of your scenes only those with this flag are heard. Returns the
-   * scene's state.
+   * Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x decibels;
+   * muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are heard.
+   * Returns the scene's state.
    */
   async update(volume) {
     refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');
@@ -174,7 +174,9 @@ function refuseOtherScenes(content, scene) {
 }
 
 /**
- * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
+ * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far. It counts an impulse
+ * as accepted before it sounds: one that is due after the scene is deleted is never heard, for which `report.ahead_s`
+ * says how long to wait after the end. `droppedStepCount`
  * steps were not sent: the oldest ones, when 4096 waited. When it is closed, one warning of the process, a
  * ContactWarning, tells of contacts that were late, lost or rejected and of time that was mapped anew, and another of
  * contacts that lie far from their objects.
@@ -271,9 +273,9 @@ class ContactStream {
 
   /**
    * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed or has been closed
-   * (CONTACT_STREAM_ENDED), and if the time is not finite or goes back (INVALID_STREAM); such a step is not sent, and the
-   * stream can go on. The promise gives the network a turn: a loop that never awaits anything sends nothing before it
-   * ends, and of more than 4096 steps that wait the oldest are dropped and counted in `droppedStepCount`.
+   * (CONTACT_STREAM_ENDED), and if the time is not finite or goes back (INVALID_STREAM); such a step is not sent, and
+   * the stream can go on. The promise gives the network a turn: a loop that never awaits anything sends nothing before
+   * it ends, and of more than 4096 steps that wait the oldest are dropped and counted in `droppedStepCount`.
    */
   step(time, content) {
     if (this.isClosing) {

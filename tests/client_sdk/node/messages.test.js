@@ -52,7 +52,8 @@ test('a stream in time is silent', async () => assert.deepEqual(await told({ acc
 test('late contacts, new mappings and lost steps are told once', async () => {
   const [text, ...others] = await told({ late_count: 1, remap_count: 2, dropped_count: 3 }, 'its frame', 1);
   assert.deepEqual(others, []);
-  assert.match(text, /^ContactWarning: 1 contact was late.*it was 0\.02.*anew 2 times.*3 contacts were lost.*1 step was not sent, .* await stream\.step/);
+  assert.match(text, /^ContactWarning: 1 contact was late.*it was 0\.02.*anew 2 times.*3 contacts were lost.*1 step was/);
+  assert.match(text, /1 step was not sent, .* await stream\.step/);
 });
 
 test('a rejection and a distant point name the frame of the stream', async () => {
@@ -188,7 +189,8 @@ test('the name of a material may come alone or before the rest of a request', as
 });
 
 test('what is no object where keys are wanted is refused', async () => {
-  for (const [call, wanted] of [[() => c.createModel(mesh, 5), "createModel is given 5; give an object, such as { material:"],
+  for (const [call, wanted] of [
+    [() => c.createModel(mesh, 5), 'createModel is given 5; give an object, such as { material: ... }'],
     [() => c.createModel(mesh, 'oak', 2), 'createModel is given 2'], [() => c.createModel(mesh, null), 'is given null'],
     [() => scene.add('modalModels/1', 'oak'), "add is given 'oak'; give an object, such as { material: ... }"],
     [async () => new carillon.Trace().add('modalModels/1', 'oak'), "add is given 'oak'; give an object"],
@@ -280,12 +282,12 @@ test('a step whose time is not finite or goes back is refused, and the trace can
   assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
 });
 
-test('a step of a stream whose time is not finite or goes back is refused at once, and the stream can go on', async () => {
+test('a step whose time is not finite or goes back is refused at once, and the stream can go on', async () => {
   const stream = stoppedStream();
   for (const time of [NaN, Infinity]) {
     assert.throws(() => stream.step(time), { reason: 'INVALID_STREAM', message: /the time of step 0 is/ });
   }
-  for (const time of [null, '0.1']) assert.throws(() => stream.step(time), /^TypeError: time is .* the simulation time/);
+  for (const time of [null, '0.1']) assert.throws(() => stream.step(time), /^TypeError: time is .* simulation time/);
   for (const time of [-1, 2, 2]) stream.step(time);
   assert.throws(() => stream.step(1.5), { reason: 'INVALID_STREAM',
     message: /goes back from 2 s to 1\.5 s at step 3; open another stream for another run$/ });

@@ -189,8 +189,8 @@ class Client:
     def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
               gain: Optional[float] = None, keep: bool = False, id: str = "", **unknown: Any) -> Scene:
         """Makes an empty scene with a linear `gain`. It ends by itself a minute after its clients, unless `keep` is
-        true. With an `id`, such as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the same settings is
-        returned as it is, and its `existing` is true."""
+        true. With an `id`, such as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the
+        same settings is returned as it is, and its `existing` is true."""
         request = checks.message(scene_service_pb2.CreateSceneRequest, "scene", dict(
             hearing=hearing, listener=None if listener is None else to_pose(listener, "listener"), gain=gain, keep=keep,
             id=id, **unknown))

@@ -247,10 +247,11 @@ _open_streams = _OpenStreams()
 
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
-    answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
-    oldest ones, when more than 4096 waited. At the end of the block one ContactWarning tells of contacts that were
-    late (`late_count`), lost or rejected and of time that was mapped anew (`remap_count`), and another of contacts that
-    lie far from their objects."""
+    answers. `report` is the newest answer, with the counts so far. It counts an impulse as accepted before it sounds:
+    one that is due after the scene is deleted is never heard, for which `report.ahead_s` says how long to wait after
+    the end. `dropped_step_count` steps were not sent: the oldest ones, when more than 4096 waited. At the end of the
+    block one ContactWarning tells of contacts that were late (`late_count`), lost or rejected and of time that was
+    mapped anew (`remap_count`), and another of contacts that lie far from their objects."""
 
     def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
