@@ -129,7 +129,7 @@ typedef struct carillon_step {
 /** The numbers of a stream's steps, and of its impulses by outcome. */
 typedef struct carillon_report {
   uint64_t step_count;         /**< steps that the daemon has read */
-  uint64_t accepted_count;     /**< impulses that sound at their time */
+  uint64_t accepted_count;     /**< impulses that came in time; heard if the scene lasts */
   uint64_t late_count;         /**< impulses that came late and sounded at once */
   uint64_t rejected_count;     /**< impulses that could not be used */
   uint64_t dropped_step_count; /**< steps that were not sent: the oldest of too many */
@@ -217,7 +217,8 @@ carillon_code carillon_stop(carillon_scene* scene);
  * carillon_add_object has added. */
 carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_frame frame,
                                    carillon_stream** stream);
-/** Sends a step. It copies the step and never waits for the daemon. */
+/** Sends a step. It copies the step and never waits for the daemon. A step whose time is not finite
+ * or goes back is refused with INVALID_STREAM and not sent, and the stream can go on. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
 /** Sends the steps that wait, waits for the daemon's answer, and ends the stream. `report` may be
  * null. If the stream was opened again, the report counts its newest part only, except that it

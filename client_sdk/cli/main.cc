@@ -167,8 +167,9 @@ void AddStrike(CLI::App& app, Program& program) {
                   "The duration of the contact, s [that of an elastic collision with the striker]")
       ->excludes(striker);
   AddStruckObject(strike, *options);
-  TakeSeconds(*strike.add_option("--seconds", options->seconds,
-                                 "The time to ring, s [until the sound has decayed by 60 dB]"));
+  TakeWithin(*strike.add_option("--seconds", options->seconds,
+                                "The time to ring, s [until the sound has decayed by 60 dB]"),
+             0.001, 1e9, "leave --seconds out to hear the sound until it has decayed");
   AddMaterial(strike, options->material);
   strike.callback([&program, options] {
     CheckImpulse(options->impulse_newton_seconds);

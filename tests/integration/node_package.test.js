@@ -329,7 +329,8 @@ test('a process ends though its streams and recordings are open', () => {
       try {
         const record = await c.listen();
         const scene = await c.createScene();
-        await scene.stream({ step: 1 / 60 }).step(0, {});
+        const stream = scene.stream({ step: 1 / 60 });
+        for (let i = 0; i < 5000; i += 1) stream.step(i / 60, {});
         await new Promise((resolve) => setTimeout(resolve, 200));
         throw new Error('a bug');
       } finally {
@@ -339,6 +340,7 @@ test('a process ends though its streams and recordings are open', () => {
   const done = spawnSync(process.execPath, ['-e', script], { encoding: 'utf8', timeout: 30000 });
   assert.deepEqual([done.status, done.stdout], [0, 'a bug\n']);
   assert.match(done.stderr, /ContactWarning: a stream of scenes\/\S+ was not closed before its client/);
+  assert.match(done.stderr, /ContactWarning: .*\d steps were not sent, .* await stream\.step/);
 });
 
 test('a forgotten await and numbers that make no rows are refused', async () => withScene(async (scene) => {

@@ -243,6 +243,19 @@ class CClientTest(DaemonTest):
         self.assertEqual(self.c.carillon_close_trace(trace), 0)
         self.assertEqual([step.time_s for step in carillon.Trace.read(file).steps], [1, 2])
 
+    def test_a_live_step_whose_time_is_not_finite_or_goes_back_is_refused_at_once(self):
+        scene, stream, report = ctypes.c_void_p(), ctypes.c_void_p(), Report()
+        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
+        self.addCleanup(self.c.carillon_delete_scene, scene)
+        self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
+        for time_s, code in ((1.0, 0), (float("nan"), 3), (0.5, 3), (2.0, 0)):
+            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(Step(time_s))), code)
+            if code:
+                refused = self.c.carillon_error()
+                self.assertRegex(refused, b"^INVALID_STREAM: .*(goes back .* at step 1|step 1 is nan); ")
+        self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0)
+        self.assertEqual(report.step_count, 2)
+
     def test_a_placed_bar_is_heard_from_its_place(self):
         """The bar is 2 m to the right of the listener, who looks along -z from z = 1 m."""
         at = Vec3(2, 0, 1)

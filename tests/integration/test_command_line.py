@@ -242,8 +242,8 @@ class RenderTest(CommandLineTest):
     def test_a_gain_in_decibels_is_the_same_for_a_file_and_for_a_strike(self):
         numpy.testing.assert_array_equal(sound.read_wave(self.render("--gain", "-20dB")),
                                          sound.read_wave(self.render("--gain", 0.1)))
-        struck = [self.run_command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", 0,
-                                   "--gain", gain) for gain in ("-20dB", 0.1)]
+        struck = [self.run_command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds",
+                                   0.01, "--gain", gain) for gain in ("-20dB", 0.1)]
         self.assertEqual(*struck)
 
     def test_a_soft_sound_is_normalised_with_its_tail(self):
@@ -319,7 +319,8 @@ class StrikeTest(CommandLineTest):
                                      "0.002", "--seconds", "0.01")
         self.assertRegex(struck.stdout, r"contact of 2 ms, peak \S+ Pa at 1 m")
         self.assertNotIn("warning", struck.stderr)
-        far = self.daemon.command("strike", "bar", "--point", "0,0.008,1", "--impulse", "0,0,-0.01", "--seconds", "0")
+        far = self.daemon.command("strike", "bar", "--point", "0,0.008,1", "--impulse", "0,0,-0.01", "--seconds",
+                                  "0.01")
         self.assertIn("from the surface", far.stderr)
         refused = self.daemon.command("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01",
                                       "--modes-only", "--seconds", "0.01", check=False)

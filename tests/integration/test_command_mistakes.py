@@ -89,7 +89,7 @@ class LostOutputTest(CommandLineTest):
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
         sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
-        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0")
+        strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0.01")
         commands = (("--help",), ("--version",), ("--man",), ("status",), ("info",), ("db", "stats"), ("doctor",),
                     ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
                     ("job", "watch", "bar"), ("material", "list"), ("volume",), ("stop",),
@@ -126,7 +126,8 @@ class WrongValuesTest(unittest.TestCase):
                                  "--point cannot be 0,0: The struck point: X,Y,Z or X Y Z"),
                                 (("job",), "a command is missing, one of list, "),
                                 ((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
-                                ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0'),
+                                ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0.001 to 1e+09'),
+                                ((*strike, "--seconds", "0"), "leave --seconds out to hear the sound until it has"),
                                 ((*strike, "--seconds", "nan"), '--seconds: "nan" must be'),
                                 ((*strike, "--gain", "-6"), "or decibels, such as -6dB"),
                                 ((*create, "--size", "0"), "--size"),

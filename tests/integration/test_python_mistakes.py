@@ -3,6 +3,7 @@
 
 import subprocess
 import sys
+import time
 import unittest
 import warnings
 
@@ -10,7 +11,7 @@ import numpy
 
 import carillon
 import meshes
-from test_python_package import BAR, PackageTest
+from test_python_package import BAR, IMPULSE, POINT, PackageTest
 
 
 class MistakesTest(PackageTest):
@@ -76,6 +77,24 @@ class MistakesTest(PackageTest):
         for address in ("/run/carillond.sock", "http://localhost:1"):
             with self.assertRaisesRegex(ValueError, '"unix:PATH" or "HOST:PORT"'):
                 carillon.connect(address)
+
+
+class SceneThatEndsTooEarlyTest(PackageTest):
+    """Has a daemon of its own, which must be silent before."""
+
+    def test_an_accepted_impulse_sounds_only_if_its_scene_lasts_until_it_is_due(self):
+        for waits in (False, True):
+            with self.c.recording() as record:
+                with self.c.scene() as scene:
+                    with scene.stream(step=0.001, delay=1) as stream:
+                        stream.step(0, impulses=carillon.Impulses(scene.add(self.model), [POINT], [IMPULSE]))
+                    self.assertEqual((stream.report.accepted_count, stream.findings.blow_count), (1, 0))
+                    if waits:  # as docs/ten_minutes_python.md says
+                        time.sleep(stream.report.ahead_s + 0.1)
+                        self.assertGreater(scene.get().active_mode_count, 0)
+                        while scene.get().active_mode_count:
+                            time.sleep(0.1)
+                self.assertEqual(record.take(2).peak > 0, waits)  # it is due after 1 s
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include "absl/synchronization/mutex.h"
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
+#include "client_sdk/cpp/internal/step_time.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -77,6 +78,11 @@ class ContactStreamCall final
       mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
       return EndedLocked();
     }
+    RETURN_IF_ERROR(
+        CheckStepTime({.number = step_count_, .time_s = step.time_s(), .previous_s = time_s_}, "",
+                      "open another stream"));
+    ++step_count_;
+    time_s_ = step.time_s();
     if (queue_.size() >= kMaxQueuedSteps) {
       queue_.pop_front();
       ++dropped_step_count_;
@@ -202,6 +208,8 @@ class ContactStreamCall final
   std::deque<QueuedStep> queue_ ABSL_GUARDED_BY(mutex_);
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
   size_t written_step_count_ ABSL_GUARDED_BY(mutex_) = 0;  ///< of `written_`
+  uint64_t step_count_ ABSL_GUARDED_BY(mutex_) = 0;        ///< steps that Send() has taken
+  double time_s_ ABSL_GUARDED_BY(mutex_) = 0;              ///< of the newest of them
   uint64_t dropped_step_count_ ABSL_GUARDED_BY(mutex_) = 0;
   v1::StreamContactsResponse report_ ABSL_GUARDED_BY(mutex_);
   std::optional<absl::Status> status_ ABSL_GUARDED_BY(mutex_);

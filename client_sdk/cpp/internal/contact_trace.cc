@@ -4,11 +4,11 @@
 #include <google/protobuf/util/delimited_message_util.h>
 
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client_sdk/cpp/internal/step_time.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -61,25 +61,15 @@ void ContactTraceWriter::Write(const v1::ContactTraceObject& object) {
 }
 
 absl::Status ContactTraceWriter::Write(const v1::ContactStep& step) {
-  RETURN_IF_ERROR(CheckTime(step.time_s()));
+  RETURN_IF_ERROR(
+      CheckStepTime({.number = step_count_, .time_s = step.time_s(), .previous_s = time_s_},
+                    absl::StrCat(path_, ": "), "write another trace"));
   v1::ContactTraceRecord record;
   *record.mutable_step() = step;
   WriteRecord(record);
   ++step_count_;
   time_s_ = step.time_s();
   return absl::OkStatus();
-}
-
-absl::Status ContactTraceWriter::CheckTime(double time_s) const {
-  if (!std::isfinite(time_s)) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
-                   absl::StrCat(path_, ": time_s of step ", step_count_, " is ", time_s,
-                                "; give the simulation time in seconds"));
-  }
-  if (step_count_ == 0 || time_s >= time_s_) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
-                 absl::StrCat(path_, ": time goes back from ", time_s_, " s to ", time_s,
-                              " s at step ", step_count_, "; write another trace for another run"));
 }
 
 void ContactTraceWriter::WriteRecord(const v1::ContactTraceRecord& record) {

@@ -49,11 +49,18 @@ function places(type, name) {
   return found;
 }
 
+/** Throws a TypeError if a value that is to have keys, such as the first of those known, is given and is no object. */
+function refuseNoObject(given, known, where) {
+  if (given === undefined || (given !== null && typeof given === 'object')) return;
+  throw new TypeError(`${where} is given ${show(given)}; give an object, such as { ${known[0]}: ... }`);
+}
+
 /**
  * Throws a TypeError with the nearest known name if an object has a key that is unknown. If it is known within a message
  * of the contract that the object stands for, of the name `type`, the error says where.
  */
 function refuseUnknown(given, known, where, type = undefined) {
+  refuseNoObject(given, known, where);
   for (const name in given) {
     if (!known.includes(name)) {
       const right = type === undefined ? [] : places(type, name);
@@ -117,11 +124,14 @@ function choice(given, words, prefix, name) {
   return prefix + word.toUpperCase();
 }
 
+const GAIN = 'a number, and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels';
+
 /** Throws a TypeError if one of the values, by their names, is given and is no number. */
 function refuseNoNumbers(values, where) {
   for (const [name, value] of Object.entries(values)) {
     const isAbsent = value === undefined || value === null;
-    if (!isAbsent && typeof value !== 'number') refuse(value, `${name} of ${where}`, 'a number');
+    const wanted = name === 'gain' ? GAIN : 'a number';
+    if (!isAbsent && typeof value !== 'number') refuse(value, `${name} of ${where}`, wanted);
   }
 }
 
@@ -132,4 +142,5 @@ function tuple(values, count, name, meaning) {
   return values;
 }
 
-module.exports = { choice, counted, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole };
+module.exports = { choice, counted, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObject, refuseUnknown,
+  tuple, whole };

@@ -3,7 +3,8 @@
 
 const util = require('util');
 const { defaultServer } = require('./address');
-const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
+const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObject,
+  refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, tokenInterceptors } = require('./credentials');
@@ -48,6 +49,17 @@ function refuseWithoutContacts({ accepted_count: accepted, peak, findings }) {
   if (accepted || peak || findings?.load_count || findings?.zero_impulse_count) return;
   throw new CarillonError('TRACE_EMPTY', 'the trace holds no contact, so there is nothing to hear; record a simulation ' +
     'in which something is struck');
+}
+
+/** The request for a model: an object, or the name of its material alone and then an object with the rest. */
+function requestFor(given, more) {
+  const [request, rest] = typeof given === 'string' ? [{ material: given }, more] : [given, undefined];
+  for (const object of [request, rest]) refuseNoObject(object, ['material'], 'createModel');
+  if (more !== rest || rest?.material !== undefined) {
+    throw new TypeError('createModel is given two materials or requests; give createModel(mesh, { material: ' +
+      "'oak', ... }) or createModel(mesh, 'oak', { ... })");
+  }
+  return { ...rest, ...request };
 }
 
 /** A connection. Its process can end when it is closed. */
@@ -124,9 +136,11 @@ class Client {
   /**
    * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates:
    * 'm', 'cm', 'mm', 'in', or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01
-   * for 1 %. `request` has other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or priority.
+   * for 1 %. The request may have other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or
+   * priority. The name of a material may come before it: createModel(mesh, 'oak', { unit: 'mm' }).
    */
-  async createModel(mesh, { material, label, onProgress = () => {}, unit, accuracy, ...request } = {}) {
+  async createModel(mesh, wanted, more) {
+    const { material, label, onProgress = () => {}, unit, accuracy, ...request } = requestFor(wanted, more);
     if (label !== undefined && label !== null && typeof label !== 'string') refuse(label, 'label of createModel', 'text');
     const own = { ...request, material: toMaterial(material) };
     refuseNoMessage(own, 'CreateModalModelRequest', 'createModel', ['label', 'onProgress', 'unit', 'accuracy']);
@@ -222,7 +236,10 @@ class Client {
       (near === undefined ? '' : `; did you mean '${near}'?`));
   }
 
-  /** Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both. */
+  /**
+   * Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level as it
+   * is, and 10 ** (x / 20) stands for x decibels. Returns both.
+   */
   setVolume(volume) {
     refuseUnknown(volume, ['gain', 'muted'], 'setVolume');
     const { gain, muted } = volume;

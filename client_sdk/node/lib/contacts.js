@@ -2,6 +2,7 @@
 'use strict';
 
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole } = require('./checks');
+const { CarillonError } = require('./errors');
 const { SCENE_FRAME } = require('./warnings');
 
 // What the arguments mean, for messages.
@@ -237,6 +238,21 @@ function makeStep(time, own) {
   return step;
 }
 
+/**
+ * Throws CarillonError (INVALID_STREAM) if step `number` of a run, counted from zero, cannot have the time after that
+ * of the step before, both in seconds. `repair` says what another run needs.
+ */
+function refuseTime(time, number, before, repair) {
+  if (!Number.isFinite(time)) {
+    throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
+      'seconds');
+  }
+  if (number && time < before) {
+    throw new CarillonError('INVALID_STREAM', `time goes back from ${before} s to ${time} s at step ${number}; ` +
+      repair);
+  }
+}
+
 /** The number of contacts and poses of a step. */
 function countRows({ impulses, columns, sustained, contacts, contact_columns, pose_columns }) {
   const lists = [impulses, columns?.object, sustained, contacts, contact_columns?.impulses.object, pose_columns?.object];
@@ -263,4 +279,5 @@ function frameInWords(frame) {
   return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
 }
 
-module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose };
+module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+  toPose };

@@ -44,10 +44,16 @@ function inNamesOfCaller(text, names) {
   return made;
 }
 
+/** A remedy as a part of createModel's request, such as settings: { mesh: { repair: true } }. */
+function settingOf({ field, value }) {
+  const [name, ...inner] = field.split('.');
+  return `${name}: ${inner.reduceRight((made, part) => `{ ${part}: ${made} }`, value)}`;
+}
+
 /** Makes the error that an ErrorInfo of the contract describes. */
 function fromInfo(info) {
   const [remedy] = info.remedies ?? [];
-  const help = remedy?.value ? `; it may help to set ${remedy.field} to ${remedy.value}` : '';
+  const help = remedy?.value ? `; it may help to call createModel with ${settingOf(remedy)}` : '';
   return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES) + help, info.metadata, info.remedies);
 }
 

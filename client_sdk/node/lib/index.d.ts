@@ -119,6 +119,7 @@ export interface StreamSettings {
 export interface ObjectSettings {
   material?: Material;
   size?: number;
+  /** Linear: 1 leaves the level as it is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels. */
   gain?: number;
   pose?: Pose;
   handle?: number;
@@ -217,7 +218,10 @@ export class Scene {
   /** Adds an object. Without a material it gets the one that the model was asked for with. */
   add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
   objects(): Promise<SoundingObject[]>;
-  /** Changes the volume, which glides within 30 ms. `solo`: of your scenes, only those with this flag are heard. */
+  /**
+   * Changes the volume, which glides within 30 ms. The gain is linear: 1 leaves the level as it is, and 10 ** (x / 20)
+   * stands for x decibels. `solo`: of your scenes, only those with this flag are heard.
+   */
   update(volume: { gain?: number; muted?: boolean; solo?: boolean }): Promise<Scene__Output>;
   /** Fades out all that sounds in the scene. Later contacts sound. */
   stop(): Promise<void>;
@@ -231,9 +235,12 @@ export class Scene {
 
 /** Sends the contacts of each step. */
 export class ContactStream {
-  /** The daemon's newest answer, with the counts so far. */
+  /**
+   * The daemon's newest answer, with the counts so far. It counts an impulse as accepted before it sounds: one that is
+   * due after the scene is deleted is never heard. Wait for `ahead_s`, in seconds, after the end of the stream.
+   */
   readonly report?: StreamContactsResponse__Output;
-  /** Steps that were not sent: the oldest ones, when 4096 waited. */
+  /** Steps that were not sent: the oldest ones, when 4096 waited. The warning of `close` tells their number, too. */
   readonly droppedStepCount: number;
   /** How many contacts came too late for their time so far, and sounded at once. */
   readonly lateCount: number;
@@ -245,8 +252,10 @@ export class ContactStream {
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;
   /**
-   * Sends a step. The promise gives the network a turn. Throws CarillonError if the stream has failed, or has been
-   * closed (CONTACT_STREAM_ENDED).
+   * Sends a step. Await the promise, which gives the network a turn: a loop that never awaits anything sends nothing
+   * before it ends, and of more than 4096 steps that wait the oldest are dropped (droppedStepCount). Throws
+   * CarillonError if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time is not finite or
+   * goes back (INVALID_STREAM); such a step is not sent, and the stream can go on.
    */
   step(time: number, content?: StepContent): Promise<void>;
   /**
@@ -268,6 +277,11 @@ export interface JobFilters {
   label_contains?: string;
 }
 
+/** What a model is asked for with beside its material. */
+export type ModelRequest = Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
+  unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number; onProgress?: (job: Job__Output) => void;
+};
+
 /** A connection. */
 export class Client {
   readonly server: string;
@@ -280,10 +294,9 @@ export class Client {
    * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates, by
    * name or in metres; `accuracy` the largest estimated error of a frequency, such as 0.01 for 1 %.
    */
-  createModel(mesh: Mesh, request: Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
-    material: Material; unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number;
-    onProgress?: (job: Job__Output) => void;
-  }): Promise<Model>;
+  createModel(mesh: Mesh, request: ModelRequest & { material: Material }): Promise<Model>;
+  /** The same with the name of a material before the rest. */
+  createModel(mesh: Mesh, material: string, request?: ModelRequest): Promise<Model>;
   /** Returns the model that the text means: a name, a label, or the first digits of a digest. */
   model(text: string, material?: Material): Promise<Model>;
   models(filters?: ListModalModelsRequest): AsyncGenerator<Model>;
@@ -300,7 +313,10 @@ export class Client {
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
   /** Begins to record what the daemon plays. Returns once it does. */
   listen(request?: ListenRequest): Promise<Recording>;
-  /** Changes the linear gain of the daemon's output, or mutes it, without a click. */
+  /**
+   * Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level as it
+   * is, and 10 ** (x / 20) stands for x decibels.
+   */
   setVolume(volume: { gain?: number; muted?: boolean }): Promise<UpdateMixerResponse__Output>;
   /** Fades out all that sounds in your scenes. Returns their number. */
   stopAll(): Promise<number>;

@@ -2,8 +2,9 @@
 'use strict';
 
 const util = require('util');
-const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { countRows, frameInWords, given, makeStep, objectsOf, present, strikeOf, toHandle, toPose } = require('./contacts');
+const { counted, refuseNoNumbers, refuseNoObject, refuseUnknown } = require('./checks');
+const { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+  toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
@@ -42,7 +43,10 @@ class SoundingObject {
     warnOfContacts(stream.findings, "the object's own frame");
   }
 
-  /** Changes what is given; a pose is reached after `glide` seconds. */
+  /**
+   * Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it is, 0.5
+   * is 6 dB less, and 10 ** (x / 20) stands for x decibels.
+   */
   async update(changes) {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
     const { material, size, gain, pose, glide = 0, radiation } = changes;
@@ -96,8 +100,12 @@ class Scene {
       ...given('gain', gain), ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
-  /** Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. */
+  /**
+   * Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. Its gain
+   * is linear, as in SoundingObject.update.
+   */
   async add(model, settings = {}) {
+    refuseNoObject(settings, OBJECT_KEYS, 'add');
     const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }, 'add'));
     return new SoundingObject(this, answer.object);
   }
@@ -109,8 +117,9 @@ class Scene {
   }
 
   /**
-   * Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes only those
-   * with this flag are heard. Returns the scene's state.
+   * Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x decibels;
+   * muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are heard.
+   * Returns the scene's state.
    */
   async update(volume) {
     refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');
@@ -165,7 +174,9 @@ function refuseOtherScenes(content, scene) {
 }
 
 /**
- * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far; `droppedStepCount`
+ * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far. It counts an impulse
+ * as accepted before it sounds: one that is due after the scene is deleted is never heard, for which `report.ahead_s`
+ * says how long to wait after the end. `droppedStepCount`
  * steps were not sent: the oldest ones, when 4096 waited. When it is closed, one warning of the process, a
  * ContactWarning, tells of contacts that were late, lost or rejected and of time that was mapped anew, and another of
  * contacts that lie far from their objects.
@@ -184,13 +195,18 @@ class ContactStream {
       this.call.on('data', (answer) => { this.report = answer; });
       this.call.on('error', (error) => {
         this.error = fromCall(error, client.server);
-        if (client.isClosed && !this.isClosing) warnOfOpenStream(start.scene);
+        if (client.isClosed && !this.isClosing) {
+          warnOfOpenStream(start.scene);
+          warnOfStream(this.report ?? {}, frameInWords(start.frame), this.droppedStepCount);
+        }
       });
       this.call.on('close', () => {
         client.openCalls.delete(this.call);
         resolve();
       });
     });
+    this.stepCount = 0; // steps that `step` has taken, also those that were dropped
+    this.time = 0; // of the newest of them
     this.waiting = [];
     this.handedCount = 0; // steps that gRPC has not sent yet
     this.isFull = !this.call.write({ start });
@@ -256,9 +272,10 @@ class ContactStream {
   }
 
   /**
-   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed, or has been closed
-   * (CONTACT_STREAM_ENDED). The promise gives the network a turn: a loop that never awaits anything sends nothing before
-   * it ends.
+   * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed or has been closed
+   * (CONTACT_STREAM_ENDED), and if the time is not finite or goes back (INVALID_STREAM); such a step is not sent, and
+   * the stream can go on. The promise gives the network a turn: a loop that never awaits anything sends nothing before
+   * it ends, and of more than 4096 steps that wait the oldest are dropped and counted in `droppedStepCount`.
    */
   step(time, content) {
     if (this.isClosing) {
@@ -269,11 +286,15 @@ class ContactStream {
     for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
       refuseOtherScenes(rows, this.start.scene);
     }
+    const made = makeStep(time, content);
+    refuseTime(time, this.stepCount, this.time, 'open another stream for another run');
+    this.stepCount += 1;
+    this.time = time;
     if (this.waiting.length >= MOST_WAITING) {
       this.waiting.shift();
       this.droppedStepCount += 1;
     }
-    this.waiting.push(makeStep(time, content));
+    this.waiting.push(made);
     this.write();
     return new Promise(setImmediate);
   }

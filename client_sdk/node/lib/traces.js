@@ -4,7 +4,7 @@
 const fs = require('fs/promises');
 const util = require('util');
 const { choice, counted, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { given, makeStep, objectsOf, present, toHandle, toPose } = require('./contacts');
+const { given, makeStep, objectsOf, present, refuseTime, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
 const { named, toRadiation } = require('./materials');
@@ -62,22 +62,8 @@ class Trace {
       }
     }
     const made = makeStep(time, content);
-    this.refuseTime(time);
+    refuseTime(time, this.steps.length, this.steps.at(-1)?.time_s ?? 0, 'make another trace for another run');
     this.steps.push(made);
-  }
-
-  /** Throws CarillonError (INVALID_STREAM) if no step can have the time after the last one. */
-  refuseTime(time) {
-    const number = this.steps.length;
-    if (!Number.isFinite(time)) {
-      throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
-        'seconds');
-    }
-    const last = this.steps.at(-1)?.time_s ?? 0;
-    if (number && time < last) {
-      throw new CarillonError('INVALID_STREAM', `time goes back from ${last} s to ${time} s at step ${number}; make ` +
-        'another trace for another run');
-    }
   }
 
   /** The header, the objects, then the steps, each a ContactTraceRecord. */

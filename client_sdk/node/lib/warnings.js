@@ -112,7 +112,8 @@ function warnOfStream(report, frame, droppedStepCount) {
     told.push(`${were(report.dropped_count, 'contact')} lost, because too many waited for the mixer`);
   }
   if (droppedStepCount) {
-    told.push(`${were(droppedStepCount, 'step')} not sent, because too many waited for the network`);
+    told.push(`${were(droppedStepCount, 'step')} not sent, because over 4096 waited for the network: await ` +
+      'stream.step(...), because a loop that never awaits anything sends nothing before it ends');
   }
   if (report.rejected_count) {
     const { reason, message } = report.last_rejection;

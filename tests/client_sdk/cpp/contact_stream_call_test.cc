@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +18,9 @@
 
 namespace carillon::client {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 /// Answers a contact stream's start, and reads its steps when it may.
 class SlowService final : public v1::ContactService::Service {
@@ -118,6 +123,25 @@ TEST_F(ContactStreamCallTest, AMessageIsNoLargerThanItsFirstStepOr64KiB) {
   EXPECT_EQ(std::ranges::count_if(service_.message_sizes, [](size_t size) { return size > 66560; }),
             1);
   EXPECT_GT(std::ranges::max(service_.step_counts), 1);
+}
+
+TEST_F(ContactStreamCallTest, RefusesAStepWhoseTimeIsNotFiniteOrGoesBackAndGoesOn) {
+  const auto send = [&](double time_s) {
+    v1::ContactStep step;
+    step.set_time_s(time_s);
+    return stream_->Send(std::move(step)).ToString();
+  };
+  for (const double time_s : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THAT(send(time_s), HasSubstr("INVALID_STREAM: time_s of step 0 is "));
+  }
+  // A simulation may begin at a time below zero, and two steps may have the same time.
+  for (const double time_s : {-1.0, 2.0, 2.0}) EXPECT_EQ(send(time_s), "OK");
+  EXPECT_THAT(send(1.5), HasSubstr("INVALID_STREAM: time goes back from 2 s to 1.5 s at step 3; "
+                                   "open another stream for another run"));
+  EXPECT_EQ(send(3), "OK");
+  sent_count_ = 4;
+  Finish();
+  EXPECT_THAT(service_.times_s, ElementsAre(-1, 2, 2, 3));
 }
 
 }  // namespace

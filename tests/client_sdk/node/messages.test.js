@@ -35,6 +35,13 @@ function told(counts, frame = "each object's own frame", dropped = 0) {
   return warningsOf(() => warnOfStream({ scheduling_delay_s: 0.02, ...counts }, frame, dropped));
 }
 
+/** A stream whose steps all wait, as if the network took none. */
+function stoppedStream() {
+  const stream = scene.stream({ step: 1 / 240 });
+  stream.isFull = true;
+  return stream;
+}
+
 function refused(expected, content) {
   assert.throws(() => new carillon.Trace({ step: 1 / 240 }).step(0, content), (error) => error.message.includes(expected)
     || assert.fail(error.message));
@@ -46,6 +53,7 @@ test('late contacts, new mappings and lost steps are told once', async () => {
   const [text, ...others] = await told({ late_count: 1, remap_count: 2, dropped_count: 3 }, 'its frame', 1);
   assert.deepEqual(others, []);
   assert.match(text, /^ContactWarning: 1 contact was late.*it was 0\.02.*anew 2 times.*3 contacts were lost.*1 step was/);
+  assert.match(text, /1 step was not sent, .* await stream\.step/);
 });
 
 test('a rejection and a distant point name the frame of the stream', async () => {
@@ -170,6 +178,28 @@ test('a wrong word or kind of value is refused by its name', async () => {
   await assert.rejects(c.createModel(mesh), /material is undefined; it must be a name such as 'oak'/);
 });
 
+test('the name of a material may come alone or before the rest of a request', async () => {
+  for (const words of [['oak'], ['oak', { size: 2 }], [{ material: 'oak', size: 2 }]]) {
+    await assert.rejects(c.createModel(mesh, ...words), carillon.ServerUnavailable);
+  }
+  await assert.rejects(c.createModel(mesh, 'oak', { unti: 'mm' }), /createModel has no "unti"; did you mean "unit"\?/);
+  for (const words of [['oak', { material: 'oak' }], [{ material: 'oak' }, { size: 2 }]]) {
+    await assert.rejects(c.createModel(mesh, ...words), /two materials or requests; .* createModel\(mesh, 'oak', \{/);
+  }
+});
+
+test('what is no object where keys are wanted is refused', async () => {
+  for (const [call, wanted] of [
+    [() => c.createModel(mesh, 5), 'createModel is given 5; give an object, such as { material: ... }'],
+    [() => c.createModel(mesh, 'oak', 2), 'createModel is given 2'], [() => c.createModel(mesh, null), 'is given null'],
+    [() => scene.add('modalModels/1', 'oak'), "add is given 'oak'; give an object, such as { material: ... }"],
+    [async () => new carillon.Trace().add('modalModels/1', 'oak'), "add is given 'oak'; give an object"],
+    [() => bell.update('louder'), "update is given 'louder'; give an object, such as { material: ... }"],
+    [async () => new carillon.Trace().step(0, { impulses: [7] }), 'impulses[0] is given 7']]) {
+    await assert.rejects(call, (error) => error.message.includes(wanted) || assert.fail(error.message));
+  }
+});
+
 test('contacts are refused by their names, with unit and frame', async () => {
   const own = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
   refused(`point of contacts[1] is [ 0, 0 ]; it must be [x, y, z]: metres ${own}`,
@@ -252,6 +282,34 @@ test('a step whose time is not finite or goes back is refused, and the trace can
   assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
 });
 
+test('a step whose time is not finite or goes back is refused at once, and the stream can go on', async () => {
+  const stream = stoppedStream();
+  for (const time of [NaN, Infinity]) {
+    assert.throws(() => stream.step(time), { reason: 'INVALID_STREAM', message: /the time of step 0 is/ });
+  }
+  for (const time of [null, '0.1']) assert.throws(() => stream.step(time), /^TypeError: time is .* simulation time/);
+  for (const time of [-1, 2, 2]) stream.step(time);
+  assert.throws(() => stream.step(1.5), { reason: 'INVALID_STREAM',
+    message: /goes back from 2 s to 1\.5 s at step 3; open another stream for another run$/ });
+  stream.step(3);
+  assert.deepEqual(stream.waiting.map((step) => step.time_s), [-1, 2, 2, 3]);
+  stream.isFull = false;
+  await assert.rejects(stream.close(), carillon.ServerUnavailable);
+});
+
+test('a step that is refused makes no other step lost', async () => {
+  const stream = stoppedStream();
+  for (let i = 0; i < 4096; i += 1) stream.step(i);
+  assert.equal(stream.waiting.length, 4096);
+  assert.throws(() => stream.step(4096, { contact: [] }), TypeError);
+  assert.throws(() => stream.step(0), { reason: 'INVALID_STREAM' });
+  assert.equal(stream.droppedStepCount, 0);
+  stream.step(4096);
+  assert.equal(stream.droppedStepCount, 1);
+  stream.isFull = false;
+  await assert.rejects(stream.close(), carillon.ServerUnavailable);
+});
+
 test('an empty name of a model is refused with the name of the argument', async () => {
   for (const text of ['', 'modalModels/', 3]) {
     await assert.rejects(c.model(text), { name: 'TypeError',
@@ -263,7 +321,8 @@ test('an empty name of a model is refused with the name of the argument', async 
 
 test('text in place of a number is refused with the name of the field', async () => {
   const refusedText = async (name, call) => assert.rejects(async () => call(), { name: 'TypeError',
-    message: `${name} is '0.5'; it must be a number` });
+    message: `${name} is '0.5'; it must be a number${name.startsWith('gain') ? linear : ''}` });
+  const linear = ', and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels';
   const text = '0.5';
   const row = { object: 1, point: POINT, impulse: IMPULSE };
   const trace = new carillon.Trace({ step: 1 / 240 });
@@ -307,6 +366,19 @@ test('refusals of the daemon have the names of the caller', () => {
     ['columns[17]: x', 'impulses[17]: x'], ['contact_columns[2]: x', 'contacts[2]: x'],
     ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
     assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
+  }
+});
+
+test('a remedy is told as createModel takes it', async () => {
+  for (const [field, value, expected] of [
+    ['settings.mesh.repair', 'true', 'settings: { mesh: { repair: true } }'],
+    ['settings.metres_per_unit', '1', 'settings: { metres_per_unit: 1 }'],
+    ['max_frequency_hz', '5000', 'max_frequency_hz: 5000']]) {
+    const { message } = fromInfo({ reason: 'INVALID', message: 'x', remedies: [{ field, value }] });
+    assert.equal(message, `INVALID: x; it may help to call createModel with ${expected}`);
+    // The words can be pasted into a call, which refuses no name of them.
+    const request = new Function(`return { ${expected} }`)();
+    await assert.rejects(c.createModel(mesh, 'oak', request), carillon.ServerUnavailable);
   }
 });
 

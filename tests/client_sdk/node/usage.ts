@@ -13,6 +13,8 @@ async function main(): Promise<void> {
     material: { preset: 'steel', alpha1_s: 1e-7 }, size: 2, settings: { poisson_ratio: 0.3 }, unit: 'mm', accuracy: 0.01,
     onProgress: (job) => console.log(job.state, job.progress?.fraction),
   });
+  const oaken = [await c.createModel(mesh, 'oak'), await c.createModel('part.stl', 'oak', { unit: 'mm' })];
+  console.log(oaken.length);
   await model.waitForTransfer({ timeout: 60, onProgress: (job) => console.log(job.label) });
   const scene = await c.createScene({ hearing: { panning: true }, listener: [0, 0, 1] });
   const bell = await scene.add(model, { pose: { position: [0, 0, 0], orientation: [1, 0, 0, 0] }, handle: 3 });

@@ -3,6 +3,7 @@
 """What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
 
 import asyncio
+import functools
 import threading
 import unittest
 import warnings
@@ -172,6 +173,19 @@ class RefusalsTest(MessagesTest):
                      handle=-1)
         self.refused("material is of type int", scene.add, "modalModels/1", 7)
 
+    def test_a_gain_that_is_no_number_is_refused_as_linear(self):
+        scene = carillon.Scene(self.c, "scenes/1")
+        bell = carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(handle=1))
+        for where, call in (("update", bell.update), ("update", scene.update), ("set_volume", self.c.set_volume),
+                            ("scene", self.c.scene), ("add", functools.partial(scene.add, "modalModels/1")),
+                            ("add", functools.partial(carillon.Trace().add, "modalModels/1"))):
+            self.refused(f"gain of {where} is '0.5'; it must be a number, and is linear: 1 leaves the level as it is, "
+                         "and 10 ** (x / 20) stands for x decibels", call, gain="0.5")
+        self.refused("size of update is 'big'; it must be a number", bell.update, size="big")
+        self.refused("muted of update is 'no'; it must be True or False", scene.update, muted="no")
+        self.refused("glide is '1'; it must be seconds", bell.update, glide="1")
+        self.refused("glide is '1'; it must be seconds", scene.move_listener, POINT, "1")
+
     def test_columns_are_refused_by_their_names_with_unit_and_frame(self):
         contacts = carillon.Contacts
         for expected, given in (
@@ -282,6 +296,17 @@ class RefusalsTest(MessagesTest):
                                ("make one with SceneService.CreateScene", "make one with Client.scene()")):
             info = error_pb2.ErrorInfo(reason="INVALID", message=said)
             self.assertEqual(carillon.errors.from_info(info).message, expected)
+
+    def test_a_remedy_is_told_as_create_model_takes_it(self):
+        for field, value, expected in (("settings.mesh.repair", "true", 'settings={"mesh": {"repair": True}}'),
+                                       ("settings.metres_per_unit", "1", 'settings={"metres_per_unit": 1}'),
+                                       ("max_frequency_hz", "5000", "max_frequency_hz=5000")):
+            info = error_pb2.ErrorInfo(reason="INVALID", message="x", remedies=[{"field": field, "value": value}])
+            self.assertEqual(carillon.errors.from_info(info).message,
+                             f"x; it may help to call create_model with {expected}")
+            # The words can be pasted into a call, which refuses no name of them.
+            with self.assertRaises(carillon.ServerUnavailable):
+                self.c.create_model(MESH, "oak", **eval(f"dict({expected})"))
 
 
 class WaitingTest(MessagesTest):

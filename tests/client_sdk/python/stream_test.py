@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which messages a contact stream of the Python package makes of the steps that wait for a slow network."""
 
+import math
 import types
 import unittest
+
+import numpy
 
 import carillon
 from carillon.v1 import contact_pb2, contact_service_pb2
@@ -32,6 +35,33 @@ class StreamTest(unittest.TestCase):
         requests = list(stub.requests)
         self.assertEqual(requests.pop(0).start, START)
         return requests
+
+    def test_a_step_whose_time_is_not_finite_or_goes_back_is_refused_at_once_and_the_stream_goes_on(self):
+        stub = SlowStub()
+        client = types.SimpleNamespace(server="unix:/nowhere", contacts_stub=stub)
+        stream = carillon.ContactStream(types.SimpleNamespace(client=client), START)
+
+        def refused(expected, send, argument):
+            with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:
+                send(argument)
+            self.assertEqual(raised.exception.reason, "INVALID_STREAM")
+
+        for time in (math.nan, math.inf):
+            refused("the time of step 0 is", stream.step, time)
+        # A simulation may begin at a time below zero, and two steps may have the same time.
+        for time in (-1, numpy.float32(2), numpy.array([2.0])):
+            stream.step(time)
+        back = r"time goes back from 2 s to 1\.5 s at step 3; open another stream for another run"
+        refused(back, stream.step, 1.5)
+        refused(back, stream.send, contact_pb2.ContactStep(time_s=1.5))
+        for wrong in (None, "2.5", b"2.5", [2.5, 3]):
+            with self.assertRaises(ValueError) as raised:
+                stream.step(wrong)
+            self.assertEqual(str(raised.exception), f"time is {wrong!r}; it must be the simulation time in seconds")
+        stream.step(3)
+        stream.close(warn=False)
+        steps = [step for request in stub.requests for step in request.steps.steps]
+        self.assertEqual([step.time_s for step in steps], [-1, 2, 2, 3])
 
     def test_small_steps_that_wait_are_sent_together_and_in_order(self):
         requests = self.requests_of([1] * 1000)

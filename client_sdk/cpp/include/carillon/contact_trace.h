@@ -38,7 +38,6 @@ class ContactTraceWriter {
 
  private:
   ContactTraceWriter(std::string path, std::ofstream file);
-  absl::Status CheckTime(double time_s) const;
   void WriteRecord(const v1::ContactTraceRecord& record);
 
   std::string path_;

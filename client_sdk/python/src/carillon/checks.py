@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NoReturn, Optional
@@ -10,6 +11,7 @@ from typing import Any, NoReturn, Optional
 import numpy
 
 MOST_OF_32_BITS = 2**32 - 1
+GAIN = "a number, and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels"
 
 
 def counted(count: int, noun: str) -> str:
@@ -75,13 +77,15 @@ def _refuse_wrong(kind: Any, field: Any, where: str, value: Any, cause: Exceptio
     try:
         kind(**{field.name: value})
     except (TypeError, ValueError):
-        wanted = "a number"
+        wanted = "a number" if field.name != "gain" else GAIN
         if field.enum_type is not None:
             wanted = "one of " + ", ".join(field.enum_type.values_by_name)
         elif field.message_type is not None:
             wanted = f"a {field.message_type.name} of the contract, or a dictionary"
         elif field.cpp_type == field.CPPTYPE_STRING:
             wanted = "text"
+        elif field.cpp_type == field.CPPTYPE_BOOL:
+            wanted = "True or False"
         elif field.cpp_type == field.CPPTYPE_UINT32 or field.cpp_type == field.CPPTYPE_UINT64:
             wanted = "a whole number, zero or more"
         raise TypeError(f"{field.name} of {where} is {value!r}; it must be {wanted}") from cause
@@ -102,6 +106,14 @@ def expect(given: Any, kind: type, name: str) -> None:
     """Raises TypeError if an argument is not of the class of this package."""
     if not isinstance(given, kind):
         raise TypeError(f"{name} is of type {type(given).__name__}; it must be a carillon.{kind.__name__}")
+
+
+def number(value: Any, name: str, meaning: str) -> float:
+    """Converts to a number, and no text. Raises ValueError that says what the number means if that is impossible."""
+    if not isinstance(value, (str, bytes)):
+        with contextlib.suppress(TypeError, ValueError):
+            return float(value)
+    refuse(value, name, meaning)
 
 
 def numbers(values: Any, name: str, meaning: str) -> numpy.ndarray:

@@ -175,10 +175,9 @@ class Client:
 
     def set_volume(self, *, gain: Optional[float] = None,
                    muted: Optional[bool] = None) -> audio_service_pb2.UpdateMixerResponse:
-        """Changes the linear gain of the daemon's output, or mutes it, without a click. Returns both."""
-        request = audio_service_pb2.UpdateMixerRequest(gain=gain)
-        if muted is not None:
-            request.muted = muted
+        """Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level
+        as it is, and 10 ** (x / 20) stands for x decibels. Returns both."""
+        request = checks.message(audio_service_pb2.UpdateMixerRequest, "set_volume", dict(gain=gain, muted=muted))
         with errors.translated(self.server):
             return self.audio_stub.UpdateMixer(request)
 
@@ -189,9 +188,9 @@ class Client:
 
     def scene(self, *, hearing: Optional[hearing_pb2.Hearing] = None, listener: Optional[PoseLike] = None,
               gain: Optional[float] = None, keep: bool = False, id: str = "", **unknown: Any) -> Scene:
-        """Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, such
-        as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the same settings is
-        returned as it is, and its `existing` is true."""
+        """Makes an empty scene with a linear `gain`. It ends by itself a minute after its clients, unless `keep` is
+        true. With an `id`, such as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the
+        same settings is returned as it is, and its `existing` is true."""
         request = checks.message(scene_service_pb2.CreateSceneRequest, "scene", dict(
             hearing=hearing, listener=None if listener is None else to_pose(listener, "listener"), gain=gain, keep=keep,
             id=id, **unknown))

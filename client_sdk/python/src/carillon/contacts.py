@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import numbers
 import operator
 from collections.abc import Iterator
@@ -329,11 +330,22 @@ def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:
                 yield name, scene.name
 
 
+def refuse_time(time: float, number: int, before: float, repair: str) -> None:
+    """Raises CarillonError (INVALID_STREAM) if step `number` of a run, counted from zero, cannot have the time after
+    that of the step before, both in seconds. `repair` says what another run needs."""
+    if not math.isfinite(time):
+        raise errors.CarillonError("INVALID_STREAM", f"the time of step {number} is {time}; give the simulation time "
+                                   "in seconds")
+    if number and time < before:
+        raise errors.CarillonError("INVALID_STREAM", f"time goes back from {before:.6g} s to {time:.6g} s at step "
+                                   f"{number}; {repair}")
+
+
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
               forces: Optional[Forces] = None, poses: Optional[Poses] = None,
               listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
     """Makes the message of the step at a simulation time, seconds."""
-    step = contact_pb2.ContactStep(time_s=float(checks.numbers(time, "time", "the simulation time in seconds")))
+    step = contact_pb2.ContactStep(time_s=checks.number(time, "time", "the simulation time in seconds"))
     for name, given, kind in (("contacts", contacts, Contacts), ("impulses", impulses, Impulses),
                               ("forces", forces, Forces), ("poses", poses, Poses)):
         if given is not None:

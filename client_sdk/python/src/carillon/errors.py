@@ -167,10 +167,19 @@ def in_names_of_caller(text: str, names: Mapping[str, str]) -> str:
     return text
 
 
+def _argument_of(remedy: error_pb2.Remedy) -> str:
+    """A remedy as an argument of create_model, such as settings={"mesh": {"repair": True}}."""
+    name, *inner = remedy.field.split(".")
+    value = {"true": "True", "false": "False"}.get(remedy.value, remedy.value)
+    for field in reversed(inner):
+        value = f'{{"{field}": {value}}}'
+    return f"{name}={value}"
+
+
 def from_info(info: error_pb2.ErrorInfo) -> CarillonError:
     text = in_names_of_caller(info.message, CALLER_NAMES)
     if info.remedies and info.remedies[0].value:
-        text += f"; it may help to set {info.remedies[0].field} to {info.remedies[0].value}"
+        text += f"; it may help to call create_model with {_argument_of(info.remedies[0])}"
     return CarillonError(info.reason, text, dict(info.metadata), info.remedies)
 
 

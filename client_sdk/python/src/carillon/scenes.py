@@ -64,11 +64,12 @@ class SoundingObject:
     def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
                gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0,
                radiation: Optional[materials.Radiation] = None) -> None:
-        """Changes what is given; a pose is reached after `glide` seconds."""
-        request = scene_service_pb2.UpdateObjectRequest(
+        """Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it
+        is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels."""
+        request = checks.message(scene_service_pb2.UpdateObjectRequest, "update", dict(
             name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
-            pose=None if pose is None else contacts.to_pose(pose), glide_s=glide,
-            radiation=materials.to_radiation(radiation))
+            pose=None if pose is None else contacts.to_pose(pose), glide_s=checks.number(glide, "glide", "seconds"),
+            radiation=materials.to_radiation(radiation)))
         client = self.scene.client
         with errors.translated(client.server):
             self.message = client.scenes_stub.UpdateObject(request).object
@@ -117,7 +118,8 @@ class Scene:
     def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
             radiation: Optional[materials.Radiation] = None) -> SoundingObject:
-        """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with."""
+        """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with.
+        `gain` is linear, as in SoundingObject.update."""
         request = self._request(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
         with errors.translated(self.client.server):
             return SoundingObject(self, self.client.scenes_stub.AddObject(request).object)
@@ -138,13 +140,11 @@ class Scene:
 
     def update(self, *, gain: Optional[float] = None, muted: Optional[bool] = None,
                solo: Optional[bool] = None) -> scene_service_pb2.Scene:
-        """Changes the volume: a linear gain; muted, so that the scene rings on unheard; solo, so that of your scenes
-        only those with this flag are heard. Changes glide within 30 ms. Returns the scene's state."""
-        request = scene_service_pb2.UpdateSceneRequest(name=self.name, gain=gain)
-        if muted is not None:
-            request.muted = muted
-        if solo is not None:
-            request.solo = solo
+        """Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x
+        decibels; muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are
+        heard. Changes glide within 30 ms. Returns the scene's state."""
+        request = checks.message(scene_service_pb2.UpdateSceneRequest, "update", dict(
+            name=self.name, gain=gain, muted=muted, solo=solo))
         with errors.translated(self.client.server):
             return self.client.scenes_stub.UpdateScene(request).scene
 
@@ -171,7 +171,8 @@ class Scene:
 
     def move_listener(self, pose: PoseLike, glide: float = 0) -> None:
         """Moves the listener, within `glide` seconds."""
-        request = scene_service_pb2.UpdateListenerRequest(scene=self.name, pose=contacts.to_pose(pose), glide_s=glide)
+        request = scene_service_pb2.UpdateListenerRequest(
+            scene=self.name, pose=contacts.to_pose(pose), glide_s=checks.number(glide, "glide", "seconds"))
         with errors.translated(self.client.server):
             self.client.scenes_stub.UpdateListener(request)
 
@@ -246,10 +247,11 @@ _open_streams = _OpenStreams()
 
 class ContactStream:
     """Sends the contacts of each step without waiting for the daemon: a thread sends them, and another reads the
-    answers. `report` is the newest answer, with the counts so far; `dropped_step_count` steps were not sent: the
-    oldest ones, when more than 4096 waited. At the end of the block one ContactWarning tells of contacts that were
-    late (`late_count`), lost or rejected and of time that was mapped anew (`remap_count`), and another of contacts that
-    lie far from their objects."""
+    answers. `report` is the newest answer, with the counts so far. It counts an impulse as accepted before it sounds:
+    one that is due after the scene is deleted is never heard, for which `report.ahead_s` says how long to wait after
+    the end. `dropped_step_count` steps were not sent: the oldest ones, when more than 4096 waited. At the end of the
+    block one ContactWarning tells of contacts that were late (`late_count`), lost or rejected and of time that was
+    mapped anew (`remap_count`), and another of contacts that lie far from their objects."""
 
     def __init__(self, scene: Scene, start: contact_service_pb2.ContactStreamStart):
         self._server = scene.client.server
@@ -259,6 +261,7 @@ class ContactStream:
         self._is_closed = False
         self.report: contact_service_pb2.StreamContactsResponse = contact_service_pb2.StreamContactsResponse()
         self.dropped_step_count = 0
+        self._step_count, self._time_s = 0, 0.0
         self._answers = scene.client.contacts_stub.StreamContacts(self._sent(start))
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -293,20 +296,23 @@ class ContactStream:
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
-        loads of a simulator that knows them; poses of objects, and of the listener."""
+        loads of a simulator that knows them; poses of objects, and of the listener. Errors as those of `send`."""
         for columns in (contacts, impulses, forces, poses):
             _refuse_other_scenes(columns, self._start.scene)
         self.send(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
 
     def send(self, step: contact_pb2.ContactStep) -> None:
-        """Sends a message of contact.proto. Raises CarillonError if the stream has failed, or has been closed
-        (CONTACT_STREAM_ENDED)."""
+        """Sends a message of contact.proto. Raises CarillonError if the stream has failed or has been closed
+        (CONTACT_STREAM_ENDED), and if the step's time is not finite or goes back (INVALID_STREAM); such a step is not
+        sent, and the stream can go on."""
         if self._is_closed:
             raise errors.CarillonError("CONTACT_STREAM_ENDED", "this stream has been closed, so that the step would "
                                        "not sound; open another one by Scene.stream")
         if self._error:
             _open_streams.streams.discard(self)
             raise errors.from_rpc(self._error, self._server)
+        contacts.refuse_time(step.time_s, self._step_count, self._time_s, "open another stream for another run")
+        self._step_count, self._time_s = self._step_count + 1, step.time_s
         if self._steps.qsize() >= MOST_WAITING:
             with contextlib.suppress(queue.Empty):  # the thread that sends may have taken it meanwhile
                 self._steps.get_nowait()

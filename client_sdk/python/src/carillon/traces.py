@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Iterator
 from typing import Any, BinaryIO, Optional
@@ -12,7 +11,8 @@ from google.protobuf.message import DecodeError
 
 from carillon import checks, contacts, materials
 from carillon.columns import varint
-from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step, scenes_of_objects
+from carillon.contacts import (
+    Contacts, Forces, Impulses, PoseLike, Poses, make_step, refuse_time, scenes_of_objects)
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
 
@@ -37,7 +37,7 @@ class Trace:
     def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *, size: float = 1,
             gain: float = 1, pose: Optional[PoseLike] = None, label: str = "", handle: Optional[int] = None,
             radiation: Optional[materials.Radiation] = None) -> int:
-        """Adds an object, which is there from the beginning. Returns its handle."""
+        """Adds an object, which is there from the beginning, with a linear `gain`. Returns its handle."""
         handle = handle or 1 + max((item.handle for item in self.objects), default=0)
         name, message = materials.named(model, material)
         self.objects.append(checks.message(contact_trace_pb2.ContactTraceObject, "add", dict(
@@ -56,18 +56,9 @@ class Trace:
         for columns in (contacts, impulses, forces, poses):
             _refuse_objects_of_scenes(columns)
         made = make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener)
-        self._check_time(made.time_s)
+        refuse_time(made.time_s, len(self.steps), self.steps[-1].time_s if self.steps else 0,
+                    "make another trace for another run")
         self.steps.append(made)
-
-    def _check_time(self, time: float) -> None:
-        """Raises CarillonError (INVALID_STREAM) if no step can have the time after the last one."""
-        number = len(self.steps)
-        if not math.isfinite(time):
-            raise CarillonError("INVALID_STREAM", f"the time of step {number} is {time}; give the simulation time in "
-                                "seconds")
-        if self.steps and time < self.steps[-1].time_s:
-            raise CarillonError("INVALID_STREAM", f"time goes back from {self.steps[-1].time_s:.6g} s to {time:.6g} s "
-                                f"at step {number}; make another trace for another run")
 
     def __repr__(self) -> str:
         return (f"<Trace: {checks.counted(len(self.objects), 'object')}, {checks.counted(len(self.steps), 'step')}, to "

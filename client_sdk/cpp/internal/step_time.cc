@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/internal/step_time.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::client {
+
+absl::Status CheckStepTime(const StepTime& step, absl::string_view where,
+                           absl::string_view another) {
+  if (!std::isfinite(step.time_s)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                   absl::StrCat(where, "time_s of step ", step.number, " is ", step.time_s,
+                                "; give the simulation time in seconds"));
+  }
+  if (step.number == 0 || step.time_s >= step.previous_s) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                 absl::StrCat(where, "time goes back from ", step.previous_s, " s to ", step.time_s,
+                              " s at step ", step.number, "; ", another, " for another run"));
+}
+
+}  // namespace carillon::client

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+
+namespace carillon::client {
+
+/// The number and the time of a step of a stream or a trace, and the time of the step before, which
+/// counts for nothing if there is none.
+struct StepTime {
+  uint64_t number = 0;  ///< from zero
+  double time_s = 0;
+  double previous_s = 0;
+};
+
+/// Checks that a time is finite and does not go back, before the daemon would end a stream because
+/// of it. An error begins with `where`, such as "FILE: ", and tells what another run of the
+/// simulation needs, such as "open another stream". Errors: InvalidArgument (INVALID_STREAM).
+absl::Status CheckStepTime(const StepTime& step, absl::string_view where,
+                           absl::string_view another);
+
+}  // namespace carillon::client
