@@ -20,7 +20,7 @@
 namespace carillon {
 namespace {
 
-constexpr std::chrono::milliseconds kStopLimit(4500);
+constexpr std::chrono::milliseconds kStopLimit(4000);
 constexpr std::chrono::milliseconds kForever(-1);
 constexpr timespec kReloadPeriod{.tv_sec = 1, .tv_nsec = 0};
 constexpr timespec kTidyPeriod{.tv_sec = 5, .tv_nsec = 0};

@@ -15,7 +15,7 @@ using StopLog = std::function<void(const std::string&)>;
 void BlockSignals();
 
 /// Ends the process on SIGINT and SIGTERM while the daemon starts, whatever the start waits for,
-/// and if its stop takes longer than 4.5 s, for instance because a call computes. Nothing that was
+/// and if its stop takes longer than 4 s, for instance because a call computes. Nothing that was
 /// acknowledged is lost: the database is written as for a loss of power. The only thread is made
 /// here, so that a stop needs neither a new thread nor memory.
 class StopGuard {
@@ -30,7 +30,7 @@ class StopGuard {
   /// The start is complete. From then on WaitForStop takes the signals.
   void CompleteStart() const;
 
-  /// The stop begins, which from then on has 4.5 s.
+  /// The stop begins, which from then on has 4 s.
   void BeginStop() const;
 
  private:

@@ -2,7 +2,9 @@
 #include "server/api/admin_service.h"
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -10,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/exception_barrier.h"
 #include "server/api/file_pieces.h"
 #include "server/api/send_call.h"
 #include "server/api/unary_call.h"
@@ -34,35 +37,42 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   return proto;
 }
 
-/// Copies the database to a file in its folder, and sends the file piece by piece.
+/// Copies the database to a file in its folder when its turn comes, and sends the file piece by
+/// piece.
 class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
  public:
-  BackupCall(grpc::CallbackServerContext& context, ModeDatabase& database, ThreadPool& pool,
-             CallBounds bounds)
-      : SendCall(context, std::move(bounds), pool), database_(database) {
-    StartWriting();
+  BackupCall(grpc::CallbackServerContext& context, const AdminContext& daemon,
+             const std::string& client, CallBounds bounds)
+      : SendCall(context, std::move(bounds), daemon.background.pool),
+        database_(daemon.database.database()) {
+    daemon.copying.Run(client, [this] {
+      copied_ = WithoutExceptions([this] { return Copy(); });
+      StartWriting();
+    });
   }
 
  private:
-  absl::StatusOr<Supply> FillNext(v1::BackUpDatabaseResponse& response) override {
-    if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin(response));
-    return pieces_.Next(*response.mutable_data());
-  }
-
-  absl::Status Begin(v1::BackUpDatabaseResponse& response) {
-    const std::filesystem::path copy = NewBackupFile(database_.database().file());
+  absl::Status Copy() {
+    const std::filesystem::path copy = NewBackupFile(database_.file());
     const absl::Cleanup remove = [&copy] {
       std::error_code ignored;
       std::filesystem::remove(copy, ignored);  // an open file stays readable
     };
-    RETURN_IF_ERROR(BackUp(database_.database(), copy, [this] { return !is_cancelled(); }));
-    response.set_byte_count(std::filesystem::file_size(copy));
+    RETURN_IF_ERROR(BackUp(database_, copy, [this] { return !is_cancelled(); }));
+    byte_count_ = std::filesystem::file_size(copy);
     pieces_.Open(copy);
     return absl::OkStatus();
   }
 
-  ModeDatabase& database_;
-  bool begun_ = false;
+  absl::StatusOr<Supply> FillNext(v1::BackUpDatabaseResponse& response) override {
+    RETURN_IF_ERROR(copied_);
+    response.set_byte_count(std::exchange(byte_count_, 0));
+    return pieces_.Next(*response.mutable_data());
+  }
+
+  Database& database_;
+  absl::Status copied_;
+  uint64_t byte_count_ = 0;  // until it has been sent
   FilePieces pieces_;
 };
 
@@ -71,8 +81,8 @@ class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
 grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerContext* context,
                                                          const v1::GetDatabaseStatsRequest*,
                                                          v1::GetDatabaseStatsResponse* response) {
-  return Answer(context, reception_, Role::kAdminister, [this, response] {
-    ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(database_.database()));
+  return Answer(context, daemon_.reception, Role::kAdminister, [this, response] {
+    ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(daemon_.database.database()));
     *response = ToProto(stats);
     return absl::OkStatus();
   });
@@ -81,32 +91,33 @@ grpc::ServerUnaryReactor* AdminService::GetDatabaseStats(grpc::CallbackServerCon
 grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDatabase(
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
   using Reactor = grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>;
-  return Open(*context, background_, Role::kAdminister, Holding::kBackup,
-              [&](const Principal&, ClientPlace place) -> Reactor* {
-                return new BackupCall(
-                    *context, database_, background_.pool,
-                    {.place = std::move(place), .idle_calls = idle_calls_, .clock = clock_});
-              });
+  return Open(
+      *context, daemon_.background, Role::kAdminister, Holding::kBackup,
+      [&](const Principal& caller, ClientPlace place) -> Reactor* {
+        return new BackupCall(
+            *context, daemon_, caller.client,
+            {.place = std::move(place), .idle_calls = daemon_.idle_calls, .clock = daemon_.clock});
+      });
 }
 
 grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerContext* context,
                                                        const v1::CollectGarbageRequest* request,
                                                        v1::CollectGarbageResponse* response) {
-  return Answer(context, writing_, Role::kAdminister, [this, request, response] {
+  return Answer(context, daemon_.writing, Role::kAdminister, [this, request, response] {
     if ((request->budget_bytes() == 0) != request->delete_unpinned()) {
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
                      "set either budget_bytes above zero, or delete_unpinned to delete every model "
                      "that is neither pinned nor sounding");
     }
-    ASSIGN_OR_RETURN(
-        const Collected models,
-        database_.models().Collect(request->budget_bytes(), {.dry_run = request->dry_run()}));
+    ASSIGN_OR_RETURN(const Collected models,
+                     daemon_.database.models().Collect(request->budget_bytes(),
+                                                       {.dry_run = request->dry_run()}));
     response->set_deleted_count(models.model_count);
     response->set_deleted_bytes(models.bytes);
     const std::chrono::milliseconds life =
         request->delete_unpinned() ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
     ASSIGN_OR_RETURN(const CollectedMeshes meshes,
-                     database_.meshes().Collect(life, request->dry_run()));
+                     daemon_.database.meshes().Collect(life, request->dry_run()));
     response->set_deleted_mesh_count(meshes.mesh_count);
     response->set_deleted_mesh_bytes(meshes.bytes);
     return absl::OkStatus();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "carillon/v1/admin_service.grpc.pb.h"
+#include "server/api/fair_turns.h"
 #include "server/api/idle_calls.h"
 #include "server/api/reception.h"
 #include "server/base/clock.h"
@@ -9,20 +10,22 @@
 
 namespace carillon {
 
+/// The parts of the daemon that the calls of administrators use.
+struct AdminContext {
+  ModeDatabase& database;
+  Reception reception;
+  Reception writing;     ///< its pool runs the calls that change the database
+  Reception background;  ///< its pool sends the backups
+  FairTurns& copying;    ///< makes the copies that are sent
+  IdleCalls& idle_calls;
+  const Clock& clock;
+};
+
 /// carillon.v1.AdminService. The objects that the constructor gets by reference must outlive the
 /// service.
 class AdminService final : public v1::AdminService::CallbackService {
  public:
-  /// The pool of `writing` runs the calls that change the database, and that of `background` makes
-  /// the backups.
-  AdminService(ModeDatabase& database, const Reception& reception, const Reception& writing,
-               const Reception& background, IdleCalls& idle_calls, const Clock& clock)
-      : database_(database),
-        reception_(reception),
-        writing_(writing),
-        background_(background),
-        idle_calls_(idle_calls),
-        clock_(clock) {}
+  explicit AdminService(const AdminContext& daemon) : daemon_(daemon) {}
 
   grpc::ServerUnaryReactor* GetDatabaseStats(grpc::CallbackServerContext* context,
                                              const v1::GetDatabaseStatsRequest* request,
@@ -34,12 +37,7 @@ class AdminService final : public v1::AdminService::CallbackService {
                                            v1::CollectGarbageResponse* response) override;
 
  private:
-  ModeDatabase& database_;
-  const Reception reception_;
-  const Reception writing_;
-  const Reception background_;
-  IdleCalls& idle_calls_;
-  const Clock& clock_;
+  const AdminContext daemon_;
 };
 
 }  // namespace carillon

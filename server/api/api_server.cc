@@ -119,7 +119,13 @@ struct ApiServer::State {
                        .idle_calls = idle_calls,
                        .idle_limit = Duration(settings.rendering_idle_s),
                        .log = [this](const std::string& line) { client_log.Warn(line); }}),
-        admin(rooms.database, reception, writing, background, idle_calls, rooms.clock),
+        admin({.database = rooms.database,
+               .reception = reception,
+               .writing = writing,
+               .background = background,
+               .copying = copying,
+               .idle_calls = idle_calls,
+               .clock = rooms.clock}),
         models({.database = rooms.database,
                 .queue = rooms.decompositions,
                 .reception = reception,
@@ -195,6 +201,8 @@ struct ApiServer::State {
   Chore keep_database{write_pool, [this] { database_keeper.Look(); }};
   FairTurns large_steps{step_pool, StepThreadCount()};
   FairTurns adding{call_pool, kAddingThreadCount};
+  /// One thread, so that the other is left for renderings.
+  FairTurns copying{background_pool, 1};
   ThreadPool step_pool{StepThreadCount()};
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool write_pool{kWriteThreadCount};

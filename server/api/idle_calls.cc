@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/idle_calls.h"
 
+#include <utility>
+
 namespace carillon {
 
 bool ClientWait::Resume() {
   const MutexLock lock(&mutex_);
-  waits_ = false;
+  if (std::exchange(waits_, false)) waited_ += clock_.Monotonic() - since_;
   return !ended_;
 }
 
@@ -18,6 +20,12 @@ void ClientWait::Begin() {
 bool ClientWait::EndIfLonger(std::chrono::nanoseconds limit) {
   const MutexLock lock(&mutex_);
   if (!waits_ || ended_ || clock_.Monotonic() - since_ < limit) return false;
+  return ended_ = true;
+}
+
+bool ClientWait::EndIfAllLonger(std::chrono::nanoseconds limit) {
+  const MutexLock lock(&mutex_);
+  if (!waits_ || ended_ || waited_ + (clock_.Monotonic() - since_) < limit) return false;
   return ended_ = true;
 }
 

@@ -26,12 +26,17 @@ class ClientWait {
   /// Returns whether the call has waited for `limit` or longer. If so, the call counts as ended.
   bool EndIfLonger(std::chrono::nanoseconds limit);
 
+  /// Returns whether the call waits and all its waiting so far adds up to `limit` or longer. If so,
+  /// the call counts as ended.
+  bool EndIfAllLonger(std::chrono::nanoseconds limit);
+
  private:
   const Clock& clock_;
   Mutex mutex_;
   bool waits_ ABSL_GUARDED_BY(mutex_) = true;
   bool ended_ ABSL_GUARDED_BY(mutex_) = false;
   std::chrono::nanoseconds since_ ABSL_GUARDED_BY(mutex_);
+  std::chrono::nanoseconds waited_ ABSL_GUARDED_BY(mutex_){0};  // before `since_`
 };
 
 /// A call that is ended if its client is silent for too long.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -15,7 +17,8 @@ namespace carillon {
 
 /// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
 /// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
-/// A call with bounds ends with UPLOAD_IDLE when its client is silent for too long.
+/// A call with bounds ends with UPLOAD_IDLE when its client is silent for too long, or sends less
+/// than 8 KiB for each second in which the call has waited for it.
 template <typename Request, typename Response, typename Sink>
 class ReadCall final : public ClientStream<Request>, public IdleCall {
  public:
@@ -37,17 +40,28 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   }
 
   void EndIfIdle(std::chrono::nanoseconds limit) override {
-    if (!wait_->EndIfLonger(limit)) return;
-    this->End(
-        Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
-                absl::StrCat("nothing was sent for ", std::chrono::duration<double>(limit).count(),
-                             " s, and nothing was stored: send it again without pauses")));
+    const double limit_s = std::chrono::duration<double>(limit).count();
+    if (wait_->EndIfLonger(limit)) {
+      return this->End(
+          Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
+                  absl::StrCat("nothing was sent for ", limit_s,
+                               " s, and nothing was stored: send it again without pauses")));
+    }
+    const std::chrono::seconds earned(byte_count_ / kLeastBytesPerSecond);
+    if (!wait_->EndIfAllLonger(limit + earned)) return;
+    this->End(Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
+                      absl::StrCat(byte_count_, " bytes took over ", limit_s,
+                                   " s longer than at 8 KiB a second, and nothing was stored: "
+                                   "send it again over a faster connection")));
   }
 
  private:
   bool gone() const override { return context_.IsCancelled(); }
 
+  static constexpr uint64_t kLeastBytesPerSecond = 8 << 10;
+
   absl::Status Take(const Request& request) override {
+    byte_count_ += request.ByteSizeLong();
     absl::Status status = sink_.Append(request);
     if (status.ok() && wait_) wait_->Begin();
     return status;
@@ -65,6 +79,7 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   Sink sink_;
   std::optional<CallBounds> bounds_;
   std::optional<ClientWait> wait_;
+  std::atomic<uint64_t> byte_count_{0};
 };
 
 }  // namespace carillon

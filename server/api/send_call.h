@@ -21,6 +21,7 @@ class SendCall : public ServerStream<Response>, public IdleCall {
         context_(context),
         bounds_(std::move(bounds)),
         wait_(bounds_.clock) {
+    wait_.Resume();  // nothing has been sent that the client could read
     bounds_.idle_calls.Add(*this);
   }
   ~SendCall() override { bounds_.idle_calls.Remove(*this); }

@@ -23,13 +23,15 @@ constexpr size_t kMostIdleReaders = 4;
 // Only the writer sets auto_vacuum, with which a new file can shrink: on an existing file this
 // pragma is a write, and a reader would wait for the writer. Changes go from the log into the file
 // whenever the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a
-// crash.
+// crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again.
 constexpr char kWriter[] =
-    "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64;";
+    "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64; "
+    "PRAGMA journal_size_limit = 16777216;";
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
-                                                          const char* first = kReader) {
-  ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
+                                                          const char* first = kReader,
+                                                          const std::string& vfs = "") {
+  ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file, vfs));
   RETURN_IF_ERROR(connection->RunScript(first));
   RETURN_IF_ERROR(connection->RunScript(
       "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;"));
@@ -84,17 +86,22 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::error_code error;
   std::filesystem::create_directories(absolute.parent_path(), error);
   if (error) return Unusable(absolute, error.message());
-  auto connection = Connect(absolute, kWriter);
-  if (!connection.ok() &&
-      (absl::IsInternal(connection.status()) || absl::IsFailedPrecondition(connection.status()))) {
-    return Unusable(absolute, connection.status().message());
-  }
-  if (!connection.ok()) return connection.status();
-  RETURN_IF_ERROR(InTransaction(**connection, "BEGIN IMMEDIATE",
-                                [](SqliteConnection& c) { return Migrate(c); }));
-  std::unique_ptr<Database> database(new Database(absolute, *std::move(connection)));
+  std::unique_ptr<Database> database(new Database(absolute));
+  RETURN_IF_ERROR(database->ConnectWriter());
   RETURN_IF_ERROR(database->ReadChangeCount());
   return database;
+}
+
+absl::Status Database::ConnectWriter() {
+  const MutexLock lock(&writer_mutex_);
+  auto connection = Connect(file_, kWriter, files_.vfs_name());
+  const absl::Status status = connection.status();
+  if (absl::IsInternal(status) || absl::IsFailedPrecondition(status)) {
+    return Unusable(file_, status.message());
+  }
+  RETURN_IF_ERROR(status);
+  writer_ = *std::move(connection);
+  return InTransaction(*writer_, "BEGIN IMMEDIATE", [](SqliteConnection& c) { return Migrate(c); });
 }
 
 absl::Status Database::ReadChangeCount() {
@@ -102,7 +109,7 @@ absl::Status Database::ReadChangeCount() {
   ASSIGN_OR_RETURN(change_count_,
                    Figure(*writer_, "SELECT value FROM facts WHERE name = 'change_count'"));
   missing_change_count_ = std::max<int64_t>(0, change_count_file_.Read() - change_count_);
-  return files_.Remember();
+  return files_.Check();
 }
 
 std::string Database::MissingChanges() const {
@@ -122,7 +129,8 @@ absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> 
 
 absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
   const auto has_no_room = [](const absl::Status& status) {
-    return absl::IsResourceExhausted(status) || absl::IsUnavailable(status);
+    return absl::IsResourceExhausted(status) ||
+           (absl::IsUnavailable(status) && ToErrorInfo(status).reason() != "DATABASE_BUSY");
   };
   MutexLock lock(&writer_mutex_);
   absl::Status status = WriteLocked(body);

@@ -64,12 +64,10 @@ class Database {
   const std::filesystem::path& file() const { return file_; }
 
  private:
-  Database(std::filesystem::path file, std::unique_ptr<SqliteConnection> writer)
-      : file_(std::move(file)),
-        files_(file_),
-        change_count_file_(file_),
-        reserve_(file_),
-        writer_(std::move(writer)) {}
+  explicit Database(std::filesystem::path file)
+      : file_(std::move(file)), files_(file_), change_count_file_(file_), reserve_(file_) {}
+
+  absl::Status ConnectWriter();
 
   absl::Status ReadChangeCount();
   absl::Status WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body)

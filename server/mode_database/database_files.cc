@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <charconv>
+#include <limits>
 #include <string>
 #include <system_error>
 
@@ -35,69 +36,37 @@ std::filesystem::path CountOf(const std::filesystem::path& file) {
 
 }  // namespace
 
-std::optional<DatabaseFiles::Seen> DatabaseFiles::Look(const std::filesystem::path& file) {
-  struct stat status {};
-  if (stat(file.c_str(), &status) != 0) return std::nullopt;
-  return Seen{.device = status.st_dev, .inode = status.st_ino, .byte_count = status.st_size};
-}
-
-bool DatabaseFiles::IsSame(const std::optional<Seen>& before, const std::optional<Seen>& now) {
-  if (!before) return true;
-  return now && now->device == before->device && now->inode == before->inode;
-}
-
-bool DatabaseFiles::IsWhole(const std::optional<Seen>& before, const std::optional<Seen>& now) {
-  return IsSame(before, now) && (!before || now->byte_count >= before->byte_count);
-}
-
-absl::Status DatabaseFiles::Remember() {
-  const MutexLock lock(&mutex_);
-  const std::optional<Seen> database = Look(file_);
-  const std::optional<Seen> log = Look(LogOf(file_));
-  lost_ = lost_ || !IsSame(database_, database) || !IsSame(log_, log);
-  database_ = database;
-  log_ = log;
-  changing_ = false;
-  return Judge();
+bool DatabaseFiles::IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
+                            WrittenSize& size) {
+  bool is_same = false;
+  const bool has_all = size.IsWhole([&]() -> int64_t {
+    struct stat status {};
+    const bool exists = stat(file.c_str(), &status) == 0;
+    if (exists && !seen) seen = Seen{.device = status.st_dev, .inode = status.st_ino};
+    is_same = exists ? seen->device == status.st_dev && seen->inode == status.st_ino : !seen;
+    return exists ? status.st_size : std::numeric_limits<int64_t>::max();
+  });
+  return is_same && has_all;
 }
 
 absl::Status DatabaseFiles::Check() {
   const MutexLock lock(&mutex_);
-  return CheckLocked();
-}
-
-absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
-  RETURN_IF_ERROR(BeginChange());
-  const absl::Status worked = work();
-  const absl::Status remembered = Remember();
-  return worked.ok() ? remembered : worked;
-}
-
-int64_t DatabaseFiles::byte_count() const {
-  const MutexLock lock(&mutex_);
-  return (database_ ? database_->byte_count : 0) + (log_ ? log_->byte_count : 0);
-}
-
-absl::Status DatabaseFiles::BeginChange() {
-  const MutexLock lock(&mutex_);
-  RETURN_IF_ERROR(CheckLocked());
-  changing_ = true;
-  return absl::OkStatus();
-}
-
-absl::Status DatabaseFiles::CheckLocked() {
-  const auto is_right = changing_ ? IsSame : IsWhole;
-  lost_ = lost_ || !is_right(database_, Look(file_)) || !is_right(log_, Look(LogOf(file_)));
-  return Judge();
-}
-
-absl::Status DatabaseFiles::Judge() const {
+  const bool has_database = IsWhole(file_, database_, sizes_.database());
+  const bool has_log = IsWhole(LogOf(file_), log_, sizes_.log());
+  lost_ = lost_ || !has_database || !has_log;
   if (!lost_) return absl::OkStatus();
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
                  absl::StrCat("somebody removed, replaced or truncated ", file_.string(),
                               " or its -wal file while the daemon ran, so that nothing can be "
                               "stored any more: stop the daemon, put the files back or run "
                               "carillond db restore, and start it again"));
+}
+
+absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
+  RETURN_IF_ERROR(Check());
+  const absl::Status worked = work();
+  RETURN_IF_ERROR(Check());
+  return worked;
 }
 
 ChangeCount::ChangeCount(const std::filesystem::path& file)

@@ -6,55 +6,52 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "server/base/mutex.h"
+#include "server/mode_database/size_watch.h"
 
 namespace carillon {
 
 /// Watches a database file and its write-ahead log, because SQLite itself goes on writing to files
-/// that somebody has removed or replaced. Safe from every thread.
+/// that somebody has removed, replaced or truncated. Safe from every thread.
 class DatabaseFiles {
  public:
   explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
 
-  /// Remembers the present sizes as correct. Errors: FailedPrecondition (DATABASE_LOST: a file was
-  /// removed or replaced). Once a function of this object has returned DATABASE_LOST, all later
-  /// calls of Remember, Check and Change return it.
-  absl::Status Remember();
+  /// Name of the VFS through which the connection that writes must be opened, and which tells this
+  /// object how large SQLite has made the files. That connection must be closed first.
+  const std::string& vfs_name() const { return sizes_.vfs_name(); }
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than at the last Remember, although no change is being made).
+  /// or is smaller than SQLite has made it). Once a function of this object has returned
+  /// DATABASE_LOST, all later calls return it. The first call remembers which files they are, and
+  /// must follow the first write.
   absl::Status Check();
 
-  /// Checks both files, runs `work`, which may change them and make them smaller, and remembers
-  /// their new sizes, also after a failure. Each write of the daemon must be made here. Errors: as
-  /// Check before the work; otherwise the work's error, or that of Remember.
+  /// Checks both files, runs `work`, which may change them, and checks them again. Each write of
+  /// the daemon must be made here. Errors: DATABASE_LOST, or the work's error.
   absl::Status Change(absl::FunctionRef<absl::Status()> work);
 
-  /// Returns the size of both files at the last Remember.
-  int64_t byte_count() const;
+  /// Returns the size of both files.
+  int64_t byte_count() const { return sizes_.database().byte_count() + sizes_.log().byte_count(); }
 
  private:
   struct Seen {
     dev_t device = 0;
     ino_t inode = 0;
-    off_t byte_count = 0;
   };
-  static std::optional<Seen> Look(const std::filesystem::path& file);
-  static bool IsSame(const std::optional<Seen>& before, const std::optional<Seen>& now);
-  static bool IsWhole(const std::optional<Seen>& before, const std::optional<Seen>& now);
-  absl::Status BeginChange();
-  absl::Status CheckLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status Judge() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  static bool IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
+                      WrittenSize& size);
 
   const std::filesystem::path file_;
-  mutable Mutex mutex_;
+  SizeWatch sizes_;
+  Mutex mutex_;
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
-  bool changing_ ABSL_GUARDED_BY(mutex_) = false;
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
 };
 

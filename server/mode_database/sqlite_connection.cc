@@ -96,8 +96,8 @@ class Row final : public SqlRow {
 }  // namespace
 
 struct SqliteConnection::State {
-  explicit State(const std::string& file)
-      : database(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
+  State(const std::string& file, const std::string& vfs)
+      : database(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs, vfs) {}
   SQLite::Database database;
 };
 
@@ -105,10 +105,10 @@ SqliteConnection::SqliteConnection(std::unique_ptr<State> state) : state_(std::m
 SqliteConnection::~SqliteConnection() = default;
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> SqliteConnection::Open(
-    const std::filesystem::path& file) {
+    const std::filesystem::path& file, const std::string& vfs) {
   std::unique_ptr<State> state;
   RETURN_IF_ERROR(Guarded([&] {
-    state = std::make_unique<State>(file.string());
+    state = std::make_unique<State>(file.string(), vfs);
     return absl::OkStatus();
   }));
   return std::unique_ptr<SqliteConnection>(new SqliteConnection(std::move(state)));
@@ -146,16 +146,21 @@ absl::Status SqliteConnection::Query(const char* sql,
 
 absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy,
                                         absl::FunctionRef<bool()> goes_on) {
-  // 1 MiB at a time. Within a transaction SQLite does not start again when others write.
-  constexpr int kPages = 256;
+  constexpr int kPages = 16;  // 1 MiB at a time
+  constexpr int kPauseMs = 10;
   return Guarded([&]() -> absl::Status {
+    // A transaction has its snapshot from its first query on. Without it SQLite would begin the
+    // copy anew whenever others write.
+    state_->database.execAndGet("SELECT count(*) FROM sqlite_schema");
     SQLite::Database target(copy.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE,
                             kBusyTimeoutMs);
+    target.exec("PRAGMA journal_mode = OFF");  // a copy that fails is removed
     SQLite::Backup backup(target, state_->database);
     int result = SQLITE_OK;
     while (result != SQLITE_DONE) {
       if (!goes_on()) return absl::CancelledError("nobody waits for the copy any more");
       result = backup.executeStep(kPages);
+      if (result == SQLITE_BUSY || result == SQLITE_LOCKED) sqlite3_sleep(kPauseMs);
     }
     return absl::OkStatus();
   });

@@ -37,9 +37,10 @@ class SqlRow {
 /// DataLoss (DATABASE_CORRUPT) or Internal (DATABASE_ERROR).
 class SqliteConnection {
  public:
-  /// Opens the file, and creates it unless it exists. Waits up to 10 s for a lock of another
-  /// process.
-  static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file);
+  /// Opens the file through the VFS with this name, or SQLite's own if it is empty, and creates the
+  /// file unless it exists. Waits up to 10 s for a lock of another process.
+  static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file,
+                                                                const std::string& vfs = "");
   ~SqliteConnection();
 
   /// Runs one statement that returns no rows.

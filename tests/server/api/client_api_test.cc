@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -138,6 +140,16 @@ TEST_F(ClientApi, AnUploadWhoseClientSaysNothingEndsAndStoresNothing) {
   v1::UploadMeshRequest request;
   request.set_data("the first half");
   call->Write(request);
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "UPLOAD_IDLE");
+}
+
+TEST_F(ClientApi, AnUploadThatTricklesEnds) {
+  grpc::ClientContext context;
+  v1::UploadMeshResponse response;
+  const auto call = models->UploadMesh(&context, &response);
+  v1::UploadMeshRequest request;
+  request.set_data("v");
+  while (call->Write(request)) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "UPLOAD_IDLE");
 }
 

@@ -14,8 +14,10 @@
 #include <thread>
 #include <vector>
 
+#include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
+#include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -77,6 +79,72 @@ TEST_F(DatabaseFilesTest, AfterTheFileWasReplacedNothingIsAcknowledged) {
 
 TEST_F(DatabaseFilesTest, AfterTheFileWasTruncatedNothingIsAcknowledged) {
   ExpectLost([&] { std::filesystem::resize_file(file_, 0); });
+}
+
+/// Stores enough in one change for a checkpoint, and calls `harm` amid the change.
+absl::Status StoreMuch(Database& database, const std::function<void()>& harm) {
+  constexpr size_t kBytes = size_t{8} << 20U;  // the log goes into the file beyond 4 MiB
+  return database.Write([&](SqliteConnection& connection) {
+    RETURN_IF_ERROR(connection.Run("CREATE TABLE IF NOT EXISTS much (bytes)"));
+    harm();
+    return connection.Run("INSERT INTO much VALUES (?)", {SqlBlob(std::string(kBytes, 'x'))});
+  });
+}
+
+TEST_F(DatabaseFilesTest, AFileThatIsTruncatedAmidAChangeIsLostAlthoughTheChangeMakesItLonger) {
+  for (const double share : {0.0, 0.5, 0.99}) {
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder / "carillon.db";
+    const auto database = *Database::Open(file);
+    ASSERT_TRUE(StoreMuch(*database, [] {}).ok());
+    const auto size = static_cast<double>(std::filesystem::file_size(file));
+    const auto truncate = [&] {
+      std::filesystem::resize_file(file, static_cast<uintmax_t>(share * size));
+    };
+    EXPECT_THAT(StoreMuch(*database, truncate).ToString(), HasSubstr("DATABASE_LOST: ")) << share;
+    EXPECT_THAT(StoreMuch(*database, [] {}).ToString(), HasSubstr("DATABASE_LOST: ")) << share;
+  }
+}
+
+TEST_F(DatabaseFilesTest, ALogThatIsTruncatedAmidAChangeIsLost) {
+  Database& database = database_->database();
+  ASSERT_TRUE(StoreMuch(database, [] {}).ok());
+  ExpectLost([&] {
+    const auto truncate = [&] { std::filesystem::resize_file(log_, 0); };
+    EXPECT_THAT(StoreMuch(database, truncate).ToString(), HasSubstr("DATABASE_LOST: "));
+  });
+}
+
+TEST_F(DatabaseFilesTest, ABackupIsMadeWhileOthersWrite) {
+  Database& database = database_->database();
+  ASSERT_TRUE(StoreMuch(database, [] {}).ok());
+  const auto pages = std::filesystem::file_size(file_) >> 20U;
+  uintmax_t count = 0;
+  const auto write = [&] {
+    EXPECT_TRUE(Put(std::to_string(++count)).ok());
+    return count < 2 * pages;
+  };
+  EXPECT_TRUE(BackUp(database, folder_ / "copy.db", write).ok());
+  EXPECT_GT(count, pages / 2);
+  // The copy is of the moment when it began.
+  const auto copy = *ModeDatabase::Open(folder_ / "copy.db", clock_);
+  EXPECT_TRUE(copy->models().Find(Sha256Hex("kept")).ok());
+  EXPECT_FALSE(copy->models().Find(Sha256Hex("2")).ok());
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "copy.db-journal"));
+}
+
+TEST_F(DatabaseFilesTest, TheLogThatGrewBesideALongReadIsSmallAfterIt) {
+  Database& database = database_->database();
+  const absl::Status read = database.Read([&](SqliteConnection& connection) {
+    RETURN_IF_ERROR(connection.Query("SELECT count(*) FROM models", {},
+                                     [](const SqlRow&) { return absl::OkStatus(); }));
+    for (int i = 0; i < 4; ++i) RETURN_IF_ERROR(StoreMuch(database, [] {}));
+    return absl::OkStatus();
+  });
+  ASSERT_TRUE(read.ok());
+  EXPECT_GT(std::filesystem::file_size(log_), 20U << 20U);
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
+  EXPECT_LE(std::filesystem::file_size(log_), 16U << 20U);
 }
 
 TEST_F(DatabaseFilesTest, AfterTheLogWasRemovedOrTruncatedNothingIsAcknowledged) {

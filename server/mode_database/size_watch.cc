@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/size_watch.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "absl/strings/str_cat.h"
+
+namespace carillon {
+namespace {
+
+std::string NewName() {
+  static std::atomic<int> count = 0;
+  return absl::StrCat("carillon-", ++count);
+}
+
+/// A file of SQLite whose size is watched. SQLite's own file lies behind it in memory.
+struct WatchedFile {
+  sqlite3_file base;
+  WrittenSize* size;
+};
+
+sqlite3_file& Real(sqlite3_file* file) {
+  return *reinterpret_cast<sqlite3_file*>(reinterpret_cast<WatchedFile*>(file) + 1);
+}
+
+WrittenSize& SizeOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->size; }
+
+/// Calls a method of SQLite's own file.
+template <auto kMethod, typename... Arguments>
+auto Forward(sqlite3_file* file, Arguments... arguments) {
+  sqlite3_file& real = Real(file);
+  return (real.pMethods->*kMethod)(&real, arguments...);
+}
+
+int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) {
+  return SizeOf(file).Write(Real(file), data, size, offset);
+}
+
+int Truncate(sqlite3_file* file, sqlite3_int64 size) {
+  return SizeOf(file).Truncate(Real(file), size);
+}
+
+using Io = sqlite3_io_methods;
+const Io kWatched = {.iVersion = 3,
+                     .xClose = Forward<&Io::xClose>,
+                     .xRead = Forward<&Io::xRead>,
+                     .xWrite = Write,
+                     .xTruncate = Truncate,
+                     .xSync = Forward<&Io::xSync>,
+                     .xFileSize = Forward<&Io::xFileSize>,
+                     .xLock = Forward<&Io::xLock>,
+                     .xUnlock = Forward<&Io::xUnlock>,
+                     .xCheckReservedLock = Forward<&Io::xCheckReservedLock>,
+                     .xFileControl = Forward<&Io::xFileControl>,
+                     .xSectorSize = Forward<&Io::xSectorSize>,
+                     .xDeviceCharacteristics = Forward<&Io::xDeviceCharacteristics>,
+                     .xShmMap = Forward<&Io::xShmMap>,
+                     .xShmLock = Forward<&Io::xShmLock>,
+                     .xShmBarrier = Forward<&Io::xShmBarrier>,
+                     .xShmUnmap = Forward<&Io::xShmUnmap>,
+                     .xFetch = Forward<&Io::xFetch>,
+                     .xUnfetch = Forward<&Io::xUnfetch>};
+
+/// Returns a file's size. A file whose size cannot be told counts as whole, because the write that
+/// follows fails by itself.
+int64_t SizeNow(sqlite3_file& file) {
+  sqlite3_int64 byte_count = 0;
+  const bool told = file.pMethods->xFileSize(&file, &byte_count) == SQLITE_OK;
+  return told ? byte_count : INT64_MAX;
+}
+
+}  // namespace
+
+void WrittenSize::Open(int64_t byte_count) {
+  const MutexLock lock(&mutex_);
+  byte_count_ = byte_count;
+}
+
+bool WrittenSize::IsWhole(absl::FunctionRef<int64_t()> look) {
+  const MutexLock lock(&mutex_);
+  lost_ = lost_ || look() < byte_count_;
+  return !lost_;
+}
+
+int WrittenSize::Write(sqlite3_file& file, const void* data, int size, int64_t offset) {
+  if (!IsWhole([&file] { return SizeNow(file); })) return SQLITE_IOERR_WRITE;
+  const int result = file.pMethods->xWrite(&file, data, size, offset);
+  if (result != SQLITE_OK) return result;
+  const MutexLock lock(&mutex_);
+  byte_count_ = std::max<int64_t>(byte_count_, offset + size);
+  return result;
+}
+
+int WrittenSize::Truncate(sqlite3_file& file, int64_t byte_count) {
+  // Under the lock, IsWhole sees the new size of the file together with the new count.
+  const MutexLock lock(&mutex_);
+  byte_count_ = std::min(byte_count_, byte_count);
+  return file.pMethods->xTruncate(&file, byte_count);
+}
+
+int64_t WrittenSize::byte_count() const {
+  const MutexLock lock(&mutex_);
+  return byte_count_;
+}
+
+struct SizeWatch::Layer {
+  explicit Layer(SizeWatch& watch)
+      : real(*sqlite3_vfs_find(nullptr)), vfs(real), database(watch.database_), log(watch.log_) {
+    vfs.zName = watch.name_.c_str();
+    vfs.pAppData = this;
+    vfs.szOsFile += static_cast<int>(sizeof(WatchedFile));
+    vfs.xOpen = Open;
+    sqlite3_vfs_register(&vfs, 0);
+  }
+  ~Layer() { sqlite3_vfs_unregister(&vfs); }
+  Layer(const Layer&) = delete;
+  Layer& operator=(const Layer&) = delete;
+
+  static int Open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int* opened) {
+    Layer& layer = *static_cast<Layer*>(vfs->pAppData);
+    const bool is_database = (flags & SQLITE_OPEN_MAIN_DB) != 0;
+    if (!is_database && (flags & SQLITE_OPEN_WAL) == 0) {
+      return layer.real.xOpen(&layer.real, name, file, flags, opened);
+    }
+    sqlite3_file& real = Real(file);
+    file->pMethods = nullptr;
+    const int result = layer.real.xOpen(&layer.real, name, &real, flags, opened);
+    if (real.pMethods == nullptr) return result;
+    WrittenSize& size = is_database ? layer.database : layer.log;
+    file->pMethods = &kWatched;
+    reinterpret_cast<WatchedFile*>(file)->size = &size;
+    if (result == SQLITE_OK) size.Open(SizeNow(real));
+    return result;
+  }
+
+  sqlite3_vfs& real;
+  sqlite3_vfs vfs;
+  WrittenSize& database;
+  WrittenSize& log;
+};
+
+SizeWatch::SizeWatch() : name_(NewName()), layer_(std::make_unique<Layer>(*this)) {}
+SizeWatch::~SizeWatch() = default;
+
+}  // namespace carillon
