@@ -243,6 +243,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 /// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options) {
   BlockSignals();
+  ApiServer::KeepLibrary();
   const StopGuard guard(LogInfo);
   RETURN_IF_ERROR(CheckLimits());
   SystemClock clock;

@@ -334,6 +334,8 @@ absl::Status ApiServer::Reload(const ApiSettings& settings) {
 
 ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 
+void ApiServer::KeepLibrary() { grpc_init(); }
+
 ApiServer::~ApiServer() {
   state_->timetable.Stop();
   state_->gate->Close();

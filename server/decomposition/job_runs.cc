@@ -183,17 +183,29 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
 }
 
 // Puts the model or the transfer into the database, without the writer's lock. An error in storing
-// it is then the outcome of the job.
+// it is then the outcome of the job. While another process holds the database, the result of what
+// may have been hours of work waits.
 Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
   if (outcome.verdict != Verdict::kOk) return outcome;
-  const std::optional<ActiveJob> job = jobs_.Find(digest);
-  if (job->deleted) return {Verdict::kCancelled, {}, {}};
-  const absl::Status stored =
-      job->record.transfer_of.empty()
-          ? database_.models().PutFile(digest, job->record.label, outcome.model_file).status()
-          : database_.transfers().PutFile(job->record.transfer_of, outcome.model_file).status();
-  if (stored.ok()) return outcome;
+  absl::Status stored;
+  for (bool told = false; true; told = true) {
+    const std::optional<ActiveJob> job = jobs_.Find(digest);
+    if (job->deleted) return {Verdict::kCancelled, {}, {}};
+    stored =
+        job->record.transfer_of.empty()
+            ? database_.models().PutFile(digest, job->record.label, outcome.model_file).status()
+            : database_.transfers().PutFile(job->record.transfer_of, outcome.model_file).status();
+    if (stored.ok()) return outcome;
+    if (ToErrorInfo(stored).reason() != "DATABASE_BUSY" || stops()) break;
+    if (!told)
+      settings_.log(absl::StrCat("the result of jobs/", digest, " waits: ", stored.message()));
+  }
   return {Verdict::kCrashed, ToErrorInfo(stored), {}};
+}
+
+bool JobRuns::stops() const {
+  const MutexLock lock(&writer_);
+  return stopping_;
 }
 
 bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {

@@ -71,6 +71,7 @@ class JobRuns {
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
+  bool stops() const ABSL_LOCKS_EXCLUDED(writer_);
   void FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   bool RunsAgain(ActiveJob& job, const Outcome& result) const;
   void CountEnd(v1::JobState state);
@@ -82,7 +83,7 @@ class JobRuns {
   const Clock& clock_;
   ActiveJobs& jobs_;
   const QueueSettings settings_;
-  Mutex writer_;
+  mutable Mutex writer_;
   Mutex ended_mutex_ ABSL_ACQUIRED_AFTER(writer_);
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;
   double mean_run_s_ ABSL_GUARDED_BY(writer_) = 10;  // a guess until a run has ended

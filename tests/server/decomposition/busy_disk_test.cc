@@ -15,6 +15,7 @@
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/local_executor.h"
+#include "server/mode_database/sqlite_connection.h"
 #include "tests/server/decomposition/scripted_worker.h"
 #include "tests/server/mode_database/faulty_vfs.h"
 
@@ -46,6 +47,12 @@ class Observer {
   bool Sees(const std::function<bool(const v1::Job&)>& test) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kDeadline, [&] { return test(job_); });
+  }
+
+  /// Returns whether the job leaves the state RUNNING within a time.
+  bool Ends(std::chrono::seconds time) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, time, [&] { return job_.state() != v1::JOB_STATE_RUNNING; });
   }
 
   bool Sees(v1::JobState state) {
@@ -157,6 +164,19 @@ TEST_F(BusyDiskTest, ReadersAndProgressAreServedWhileAModelIsStored) {
   EXPECT_TRUE(first.Sees(v1::JOB_STATE_SUCCEEDED));
   gate2_.Open();
   EXPECT_TRUE(second.Sees(v1::JOB_STATE_SUCCEEDED));
+}
+
+TEST_F(BusyDiskTest, AResultWaitsForAProcessThatHoldsTheDatabase) {
+  Observer observer;
+  const auto watch = SubmitAndWatch(Request(1), observer);
+  ASSERT_TRUE(observer.Sees(v1::JOB_STATE_RUNNING));
+  const auto other = *SqliteConnection::Open(folder_ / "carillon.db");
+  ASSERT_TRUE(other->Run("BEGIN IMMEDIATE").ok());
+  gate1_.Open();
+  // A write gives up after 10 s.
+  EXPECT_FALSE(observer.Ends(std::chrono::seconds(12)));
+  ASSERT_TRUE(other->Run("ROLLBACK").ok());
+  EXPECT_TRUE(observer.Sees(v1::JOB_STATE_SUCCEEDED));
 }
 
 TEST_F(BusyDiskTest, ReadersAreServedWhileACoarseModelIsCopied) {
