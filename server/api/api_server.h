@@ -79,7 +79,6 @@ class ApiServer {
   /// last object is destroyed, and may wait 10 s for one that polls. A process calls it once.
   static void KeepLibrary();
 
-
   /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
   /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
   /// without TLS or without an access file, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE,
