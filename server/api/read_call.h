@@ -50,7 +50,7 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
     const std::chrono::seconds earned(byte_count_ / kLeastBytesPerSecond);
     if (!wait_->EndIfAllLonger(limit + earned)) return;
     this->End(Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
-                      absl::StrCat(byte_count_.load(), " bytes took over ", limit_s,
+                      absl::StrCat("it took over ", limit_s,
                                    " s longer than at 8 KiB a second, and nothing was stored: "
                                    "send it again over a faster connection")));
   }

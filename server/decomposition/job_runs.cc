@@ -190,7 +190,8 @@ Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
   absl::Status stored;
   for (bool told = false; true; told = true) {
     const std::optional<ActiveJob> job = jobs_.Find(digest);
-    if (job->deleted) return {Verdict::kCancelled, {}, {}};
+    const bool cancelled = told && job->record.state == v1::JOB_STATE_CANCELLED;
+    if (job->deleted || cancelled) return {Verdict::kCancelled, {}, {}};
     stored =
         job->record.transfer_of.empty()
             ? database_.models().PutFile(digest, job->record.label, outcome.model_file).status()

@@ -55,6 +55,9 @@ absl::Status DatabaseFiles::Check() {
   const bool has_log = IsWhole(LogOf(file_), log_, sizes_.log());
   lost_ = lost_ || !has_database || !has_log;
   if (!lost_) return absl::OkStatus();
+  // The stop would copy a damaged log into the file.
+  sizes_.database().Close();
+  sizes_.log().Close();
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
                  absl::StrCat("somebody removed, replaced or truncated ", file_.string(),
                               " or its -wal file while the daemon ran, so that nothing can be "
@@ -64,7 +67,7 @@ absl::Status DatabaseFiles::Check() {
 
 absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
   RETURN_IF_ERROR(Check());
-  const absl::Status worked = work();
+  absl::Status worked = work();
   RETURN_IF_ERROR(Check());
   return worked;
 }

@@ -99,7 +99,8 @@ absl::Status CopyMesh(Database& from, Database& to, const std::string& digest) {
                    absl::StrCat("the mesh ", digest, " has changed on the disk: upload it again"));
   }
   const SystemClock clock;
-  ASSIGN_OR_RETURN(MeshUpload copy, MeshStore(to, clock).Begin());
+  MeshStore meshes(to, clock);
+  ASSIGN_OR_RETURN(MeshUpload copy, meshes.Begin());
   status = ReadMesh(from, digest, [&](std::string_view bytes) { return copy.Append(bytes); });
   return status.ok() ? copy.Finish().status() : status;
 }

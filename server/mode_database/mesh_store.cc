@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <limits>
 #include <map>
 #include <optional>
 #include <system_error>
@@ -196,6 +197,19 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
 }
 
 absl::StatusOr<CollectedMeshes> MeshStore::Collect(std::chrono::milliseconds life, bool dry_run) {
+  // The log of a full disk has room for the deletion of a few meshes at a time.
+  const size_t most = dry_run ? std::numeric_limits<size_t>::max() : 32;
+  CollectedMeshes all;
+  CollectedMeshes some;
+  do {
+    ASSIGN_OR_RETURN(some, CollectSome(life, dry_run, most));
+    all = {all.mesh_count + some.mesh_count, all.bytes + some.bytes};
+  } while (some.mesh_count == most);
+  return all;
+}
+
+absl::StatusOr<CollectedMeshes> MeshStore::CollectSome(std::chrono::milliseconds life, bool dry_run,
+                                                       size_t most) {
   const int64_t before = clock_->UnixMs() - life.count();
   CollectedMeshes collected;
   RETURN_IF_ERROR(database_->WriteToFree([&](SqliteConnection& connection) {
@@ -210,8 +224,8 @@ absl::StatusOr<CollectedMeshes> MeshStore::Collect(std::chrono::milliseconds lif
     if (!done.ok() || unused.empty()) return done;
     done = ForEachReference(connection, [&](const std::string& mesh) { unused.erase(mesh); });
     for (const auto& [digest, bytes] : unused) {
-      if (done.ok() && !dry_run)
-        done = connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
+      if (!done.ok() || collected.mesh_count == most) break;
+      if (!dry_run) done = connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
       collected = {collected.mesh_count + 1, collected.bytes + bytes};
     }
     return done;

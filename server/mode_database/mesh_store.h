@@ -26,7 +26,7 @@ struct StoredMesh {
 
 /// A mesh file that arrives in pieces. The pieces are collected in a nameless file in the
 /// database's folder, so that a slow sender occupies neither memory nor a transaction. One thread
-/// at a time.
+/// at a time. The MeshStore must outlive its uploads.
 class MeshUpload {
  public:
   /// Appends the next bytes. Errors: ResourceExhausted (MESH_TOO_LARGE: over 256 MiB in all).
@@ -88,6 +88,9 @@ class MeshStore {
 
  private:
   friend class MeshUpload;
+  /// Deletes at most `most` meshes in one transaction.
+  absl::StatusOr<CollectedMeshes> CollectSome(std::chrono::milliseconds life, bool dry_run,
+                                              size_t most);
 
   Database* database_;
   const Clock* clock_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -353,7 +354,20 @@ absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
 
 absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
                                               const CollectSettings& settings) {
+  // The log of a full disk has room for the deletion of a few models at a time.
+  const size_t most = settings.dry_run ? std::numeric_limits<size_t>::max() : 16;
   MutexLock lock(&cache_mutex_);
+  Collected all;
+  Collected some;
+  do {
+    ASSIGN_OR_RETURN(some, CollectSome(budget_bytes, settings, most));
+    all = {all.model_count + some.model_count, all.bytes + some.bytes};
+  } while (some.model_count == most);
+  return all;
+}
+
+absl::StatusOr<Collected> ModelStore::CollectSome(uint64_t budget_bytes,
+                                                  const CollectSettings& settings, size_t most) {
   Collected collected;
   const auto collect =
       [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
@@ -366,7 +380,7 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
           total_bytes += model.bytes;
         }));
         for (const ModelSize& model : oldest_first) {
-          if (total_bytes <= budget_bytes) break;
+          if (total_bytes <= budget_bytes || collected.model_count == most) break;
           if (model.pinned || model.digest == settings.spared || InMemory(model.digest)) continue;
           if (!settings.dry_run) RETURN_IF_ERROR(DeleteModelRows(connection, model.digest));
           total_bytes -= model.bytes;

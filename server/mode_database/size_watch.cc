@@ -85,6 +85,11 @@ bool WrittenSize::IsWhole(absl::FunctionRef<int64_t()> look) {
   return !lost_;
 }
 
+void WrittenSize::Close() {
+  const MutexLock lock(&mutex_);
+  lost_ = true;
+}
+
 int WrittenSize::Write(sqlite3_file& file, const void* data, int size, int64_t offset) {
   if (!IsWhole([&file] { return SizeNow(file); })) return SQLITE_IOERR_WRITE;
   const int result = file.pMethods->xWrite(&file, data, size, offset);
@@ -97,6 +102,7 @@ int WrittenSize::Write(sqlite3_file& file, const void* data, int size, int64_t o
 int WrittenSize::Truncate(sqlite3_file& file, int64_t byte_count) {
   // Under the lock, IsWhole sees the new size of the file together with the new count.
   const MutexLock lock(&mutex_);
+  if (lost_) return SQLITE_IOERR_TRUNCATE;
   byte_count_ = std::min(byte_count_, byte_count);
   return file.pMethods->xTruncate(&file, byte_count);
 }

@@ -24,10 +24,13 @@ class WrittenSize {
   /// returns the file's size. Once this has returned false, it always does.
   bool IsWhole(absl::FunctionRef<int64_t()> look);
 
+  /// Lets all later calls of Write and Truncate fail.
+  void Close();
+
   /// Writes to the file, as sqlite3_io_methods::xWrite does, unless it is not whole.
   int Write(sqlite3_file& file, const void* data, int size, int64_t offset);
 
-  /// Changes the file's size, as sqlite3_io_methods::xTruncate does.
+  /// Changes the file's size, as sqlite3_io_methods::xTruncate does, unless it is not whole.
   int Truncate(sqlite3_file& file, int64_t byte_count);
 
   int64_t byte_count() const;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <fstream>
 #include <functional>
 #include <string>
@@ -113,6 +114,47 @@ TEST_F(DatabaseFilesTest, ALogThatIsTruncatedAmidAChangeIsLost) {
     const auto truncate = [&] { std::filesystem::resize_file(log_, 0); };
     EXPECT_THAT(StoreMuch(database, truncate).ToString(), HasSubstr("DATABASE_LOST: "));
   });
+}
+
+TEST_F(DatabaseFilesTest, ALostDatabaseIsNotWrittenAtTheEnd) {
+  Open();  // the log has gone into the file
+  const std::string whole = ReadBytes(file_);
+  ASSERT_TRUE(Put("in the log").ok());
+  // A log of zeros, as somebody makes it by truncating a file and making it long again.
+  const uintmax_t size = std::filesystem::file_size(log_);
+  std::filesystem::resize_file(log_, 0);
+  EXPECT_FALSE(database_->database().CheckFiles().ok());
+  std::filesystem::resize_file(log_, size);
+  database_.reset();
+  EXPECT_EQ(ReadBytes(file_), whole);
+  Open();
+  EXPECT_TRUE(Has("kept"));
+}
+
+TEST_F(DatabaseFilesTest, ARepairKeepsMeshesAndModels) {
+  const std::string digest = database_->meshes().Put("solid")->digest;
+  database_.reset();
+  std::vector<std::string> findings;
+  const auto note = [&](const std::string& line) { findings.push_back(line); };
+  ASSERT_TRUE(RepairDatabase(file_, note).ok());
+  EXPECT_THAT(findings, IsEmpty());
+  Open();
+  EXPECT_TRUE(Has("kept"));
+  EXPECT_TRUE(database_->meshes().WriteFile(digest, folder_ / "mesh").ok());
+}
+
+TEST_F(DatabaseFilesTest, ACollectionDeletesMoreThanOneTransactionDoes) {
+  for (int i = 0; i < 40; ++i) {
+    ASSERT_TRUE(Put(std::to_string(i)).ok());
+    ASSERT_TRUE(database_->meshes().Put("solid " + std::to_string(i)).ok());
+  }
+  EXPECT_EQ(database_->models().Collect(0, {.dry_run = true})->model_count, 41U);
+  EXPECT_EQ(database_->models().Collect(0)->model_count, 41U);
+  EXPECT_EQ(database_->models().Collect(0)->model_count, 0U);
+  constexpr std::chrono::milliseconds kAnyAge(-1000);
+  EXPECT_EQ(database_->meshes().Collect(kAnyAge, true)->mesh_count, 40U);
+  EXPECT_EQ(database_->meshes().Collect(kAnyAge)->mesh_count, 40U);
+  EXPECT_EQ(database_->meshes().Collect(kAnyAge)->mesh_count, 0U);
 }
 
 TEST_F(DatabaseFilesTest, ABackupIsMadeWhileOthersWrite) {
