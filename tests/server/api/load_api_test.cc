@@ -1,13 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
 namespace {
 
 /// A daemon whose clients send as much as they can.
-class LoadApi : public ServedDaemon {};
+class LoadApi : public ServedDaemon {
+ protected:
+  explicit LoadApi(const ApiSettings& settings = {.client_share = 1}) : ServedDaemon(settings) {}
+
+  /// Begins to render a trace, whose objects come next.
+  std::unique_ptr<grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>> BeginTrace(
+      grpc::ClientContext& context) {
+    auto stream = audio->Render(&context);
+    v1::RenderRequest request;
+    request.mutable_settings()->set_tail_s(0.2);
+    stream->Write(request);
+    request.mutable_record()->mutable_header()->set_format_version(1);
+    stream->Write(request);
+    return stream;
+  }
+};
 
 TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
   v1::AddObjectRequest object = SmallObject(CreateScene());
@@ -38,12 +55,8 @@ TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
 
 TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
   grpc::ClientContext context;
-  const auto stream = audio->Render(&context);
+  const auto stream = BeginTrace(context);
   v1::RenderRequest request;
-  request.mutable_settings()->set_tail_s(0.2);
-  stream->Write(request);
-  request.mutable_record()->mutable_header()->set_format_version(1);
-  stream->Write(request);
   v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
   object.set_modal_model(ImportSmallModel());
   *object.mutable_material() = SmallMaterial();
@@ -57,19 +70,15 @@ TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
 }
 
 /// A daemon of whose memory for renderings one client has very little.
-class LittleMemoryApi : public ServedDaemon {
+class LittleMemoryApi : public LoadApi {
  protected:
-  LittleMemoryApi() : ServedDaemon({.client_share = 0.001}) {}
+  LittleMemoryApi() : LoadApi({.client_share = 0.001}) {}
 };
 
 TEST_F(LittleMemoryApi, ATraceThatTakesMoreThanTheClientsShareIsRefused) {
   grpc::ClientContext context;
-  const auto stream = audio->Render(&context);
+  const auto stream = BeginTrace(context);
   v1::RenderRequest request;
-  request.mutable_settings()->set_tail_s(0.2);
-  stream->Write(request);
-  request.mutable_record()->mutable_header()->set_format_version(1);
-  stream->Write(request);
   v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
   object.set_handle(1);
   object.set_modal_model(ImportSmallModel());
