@@ -4,6 +4,7 @@
 import math
 import pathlib
 import tempfile
+import time
 import unittest
 
 import numpy
@@ -136,6 +137,8 @@ class TransferTest(unittest.TestCase):
         self.assertEqual(radiation, radiation_pb2.RADIATION_MODEL_PAPER_COUPLING)
         before = self.render(model, radiation_pb2.RADIATION_MODEL_UNSPECIFIED)
 
+        while not (self.folder / "runs").exists():  # the job's process may only just have been started
+            time.sleep(0.01)
         self.daemon.kill()
         self.daemon.start()
         self.client = self.daemon.client()
