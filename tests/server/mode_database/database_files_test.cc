@@ -88,7 +88,7 @@ absl::Status StoreMuch(Database& database, const std::function<void()>& harm) {
   return database.Write([&](SqliteConnection& connection) {
     RETURN_IF_ERROR(connection.Run("CREATE TABLE IF NOT EXISTS much (bytes)"));
     harm();
-    return connection.Run("INSERT INTO much VALUES (?)", {SqlBlob(std::string(kBytes, 'x'))});
+    return connection.Run("INSERT INTO much VALUES (?)", {SqlBlob{std::string(kBytes, 'x')}});
   });
 }
 
