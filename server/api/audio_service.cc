@@ -46,7 +46,7 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::Ren
                      .idle_calls = daemon_.idle_calls},
                     *context,
                     {.call = std::move(place),
-                     .memory = ClientPlace(limits, Holding::kRenderingMib, caller.client, 0)});
+                     .memory = ClientPlace(limits, Holding::kRenderingMib, caller.client)});
               });
 }
 

@@ -66,18 +66,17 @@ absl::Status ClientPlace::Grow(size_t count) {
 size_t ClientPlace::most() const { return limits_ == nullptr ? 0 : limits_->MostOf(holding_); }
 
 size_t ClientLimits::MostOf(Holding holding) const {
-  const size_t whole = BoundOf(holding).whole;
-  return share_ >= 1 ? whole : ShareOf(whole, share_);
+  return ShareOf(BoundOf(holding).whole, share_);
 }
 
 size_t ClientLimits::ShareOf(size_t whole, double share) {
   return std::max<size_t>(1, static_cast<size_t>(static_cast<double>(whole) * share));
 }
 
-absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client,
-                                               size_t count) {
-  RETURN_IF_ERROR(Add(holding, client, count));
-  return ClientPlace(*this, holding, client, count);
+absl::StatusOr<ClientPlace> ClientLimits::Take(Holding holding, const std::string& client) {
+  ClientPlace place(*this, holding, client);
+  RETURN_IF_ERROR(place.Grow(1));
+  return place;
 }
 
 absl::Status ClientLimits::Add(Holding holding, const std::string& client, size_t count) {

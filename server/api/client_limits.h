@@ -53,8 +53,9 @@ class ClientLimits;
 class ClientPlace {
  public:
   ClientPlace() = default;
-  ClientPlace(ClientLimits& limits, Holding holding, std::string client, size_t count)
-      : limits_(&limits), holding_(holding), client_(std::move(client)), count_(count) {}
+  /// Holds no place until Grow takes some.
+  ClientPlace(ClientLimits& limits, Holding holding, std::string client)
+      : limits_(&limits), holding_(holding), client_(std::move(client)) {}
   ClientPlace(ClientPlace&& other) noexcept { *this = std::move(other); }
   ClientPlace& operator=(ClientPlace&& other) noexcept {
     std::swap(limits_, other.limits_);
@@ -87,11 +88,11 @@ class ClientLimits {
   /// no limit for a single client.
   explicit ClientLimits(double share) : share_(share) {}
 
-  /// Takes `count` places for a client. They must not outlive the ClientLimits. Errors:
+  /// Takes a place for a client. The place must not outlive the ClientLimits. Errors:
   /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_RENDERINGS, RENDERING_MEMORY_FULL,
   /// TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS: all clients together have reached the
   /// greatest number at a time).
-  absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client, size_t count = 1);
+  absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
   /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names
   /// the things, such as objects, which the caller counts. Errors: ResourceExhausted

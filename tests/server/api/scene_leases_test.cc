@@ -121,15 +121,15 @@ TEST(ClientLimits, TheMemoryOfAllRenderingsIsBounded) {
   constexpr Holding kMib = Holding::kRenderingMib;
   ClientLimits limits(0.5);
   const size_t half = MostRenderingMib() / 2;
-  ClientPlace first(limits, kMib, "a", 0);
-  ClientPlace second(limits, kMib, "b", 0);
+  ClientPlace first(limits, kMib, "a");
+  ClientPlace second(limits, kMib, "b");
   EXPECT_TRUE(first.Grow(half - 1).ok());
   EXPECT_TRUE(first.Grow(half).ok());
   EXPECT_THAT(first.Grow(half + 1).ToString(), testing::HasSubstr("CLIENT_LIMIT_REACHED"));
   EXPECT_EQ(limits.count(kMib), half);
   EXPECT_EQ(first.most(), half);
   EXPECT_TRUE(second.Grow(half).ok());
-  ClientPlace third(limits, kMib, "c", 0);
+  ClientPlace third(limits, kMib, "c");
   EXPECT_THAT(third.Grow(2).ToString(), testing::HasSubstr("RENDERING_MEMORY_FULL"));
   first = ClientPlace();
   EXPECT_TRUE(third.Grow(2).ok());
