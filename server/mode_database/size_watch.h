@@ -17,7 +17,7 @@ namespace carillon {
 /// every thread.
 class WrittenSize {
  public:
-  /// Notes that a file with so many bytes was opened.
+  /// Notes that SQLite has opened a file of `byte_count` bytes.
   void Open(int64_t byte_count);
 
   /// Returns whether the file has at least the bytes that SQLite gave it, by `look()`, which

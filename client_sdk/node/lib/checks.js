@@ -124,7 +124,7 @@ function choice(given, words, prefix, name) {
   return prefix + word.toUpperCase();
 }
 
-const GAIN = 'a number, and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels';
+const GAIN = 'a number. A gain is a linear factor: 1 keeps the level, and 10 ** (x / 20) changes it by x decibels';
 
 /** Throws a TypeError if one of the values, by their names, is given and is no number. */
 function refuseNoNumbers(values, where) {

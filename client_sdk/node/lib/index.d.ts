@@ -119,7 +119,7 @@ export interface StreamSettings {
 export interface ObjectSettings {
   material?: Material;
   size?: number;
-  /** Linear: 1 leaves the level as it is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels. */
+  /** A linear factor: 1 keeps the level, 0.5 lowers it by 6 dB, and 10 ** (x / 20) changes it by x decibels. */
   gain?: number;
   pose?: Pose;
   handle?: number;
@@ -219,8 +219,8 @@ export class Scene {
   add(model: Model | string, settings?: ObjectSettings): Promise<SoundingObject>;
   objects(): Promise<SoundingObject[]>;
   /**
-   * Changes the volume, which glides within 30 ms. The gain is linear: 1 leaves the level as it is, and 10 ** (x / 20)
-   * stands for x decibels. `solo`: of your scenes, only those with this flag are heard.
+   * Changes the volume, which glides within 30 ms. The gain is a linear factor: 1 keeps the level, and
+   * 10 ** (x / 20) changes it by x decibels. If you set `solo` for some of your scenes, the others are not heard.
    */
   update(volume: { gain?: number; muted?: boolean; solo?: boolean }): Promise<Scene__Output>;
   /** Fades out all that sounds in the scene. Later contacts sound. */

@@ -44,8 +44,8 @@ class SoundingObject {
   }
 
   /**
-   * Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it is, 0.5
-   * is 6 dB less, and 10 ** (x / 20) stands for x decibels.
+   * Changes what is given; a pose is reached after `glide` seconds. `gain` is a linear factor: 1 keeps the level, 0.5
+   * lowers it by 6 dB, and 10 ** (x / 20) changes it by x decibels.
    */
   async update(changes) {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
@@ -117,9 +117,9 @@ class Scene {
   }
 
   /**
-   * Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x decibels;
-   * muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are heard.
-   * Returns the scene's state.
+   * Changes the volume, and returns the scene's state. `gain` is a linear factor: 1 keeps the level, and 10 ** (x / 20)
+   * changes it by x decibels. A `muted` scene rings on unheard. If you set `solo` for some of your scenes, the others
+   * are not heard.
    */
   async update(volume) {
     refuseUnknown(volume, ['gain', 'muted', 'solo'], 'update');

@@ -322,7 +322,7 @@ test('an empty name of a model is refused with the name of the argument', async 
 test('text in place of a number is refused with the name of the field', async () => {
   const refusedText = async (name, call) => assert.rejects(async () => call(), { name: 'TypeError',
     message: `${name} is '0.5'; it must be a number${name.startsWith('gain') ? linear : ''}` });
-  const linear = ', and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels';
+  const linear = '. A gain is a linear factor: 1 keeps the level, and 10 ** (x / 20) changes it by x decibels';
   const text = '0.5';
   const row = { object: 1, point: POINT, impulse: IMPULSE };
   const trace = new carillon.Trace({ step: 1 / 240 });

@@ -179,8 +179,8 @@ class RefusalsTest(MessagesTest):
         for where, call in (("update", bell.update), ("update", scene.update), ("set_volume", self.c.set_volume),
                             ("scene", self.c.scene), ("add", functools.partial(scene.add, "modalModels/1")),
                             ("add", functools.partial(carillon.Trace().add, "modalModels/1"))):
-            self.refused(f"gain of {where} is '0.5'; it must be a number, and is linear: 1 leaves the level as it is, "
-                         "and 10 ** (x / 20) stands for x decibels", call, gain="0.5")
+            self.refused(f"gain of {where} is '0.5'; it must be a number. A gain is a linear factor: 1 keeps the "
+                         "level, and 10 ** (x / 20) changes it by x decibels", call, gain="0.5")
         self.refused("size of update is 'big'; it must be a number", bell.update, size="big")
         self.refused("muted of update is 'no'; it must be True or False", scene.update, muted="no")
         self.refused("glide is '1'; it must be seconds", bell.update, glide="1")

@@ -11,7 +11,7 @@ from typing import Any, NoReturn, Optional
 import numpy
 
 MOST_OF_32_BITS = 2**32 - 1
-GAIN = "a number, and is linear: 1 leaves the level as it is, and 10 ** (x / 20) stands for x decibels"
+GAIN = "a number. A gain is a linear factor: 1 keeps the level, and 10 ** (x / 20) changes it by x decibels"
 
 
 def counted(count: int, noun: str) -> str:

@@ -175,8 +175,9 @@ class Client:
 
     def set_volume(self, *, gain: Optional[float] = None,
                    muted: Optional[bool] = None) -> audio_service_pb2.UpdateMixerResponse:
-        """Changes the gain of the daemon's output, or mutes it, without a click. The gain is linear: 1 leaves the level
-        as it is, and 10 ** (x / 20) stands for x decibels. Returns both."""
+        """Changes the gain of the daemon's output, or mutes it, without a click. The gain is a linear factor: 1
+        keeps the level, and 10 ** (x / 20) changes it by x decibels. The answer has the gain and whether the output is
+        muted."""
         request = checks.message(audio_service_pb2.UpdateMixerRequest, "set_volume", dict(gain=gain, muted=muted))
         with errors.translated(self.server):
             return self.audio_stub.UpdateMixer(request)

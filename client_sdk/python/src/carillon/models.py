@@ -104,7 +104,7 @@ class Model:
                       seconds: float = 0, sample_rate_hz: int = 48000) -> Sound:
         """Renders one strike without a scene and faster than real time. The samples are the same each time once the
         transfer of the model is computed (wait_for_transfer). `duration` is that of the contact, in seconds; without it
-        the `striker`, such as "wood", determines it. `gain` is linear: 10 ** (x / 20) stands for x decibels. `seconds`
+        the `striker`, such as "wood", determines it. `gain` is a linear factor: 10 ** (x / 20) is x dB. `seconds`
         zero means until the sound has died away."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)

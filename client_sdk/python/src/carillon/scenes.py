@@ -64,8 +64,8 @@ class SoundingObject:
     def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
                gain: Optional[float] = None, pose: Optional[PoseLike] = None, glide: float = 0,
                radiation: Optional[materials.Radiation] = None) -> None:
-        """Changes what is given; a pose is reached after `glide` seconds. `gain` is linear: 1 leaves the level as it
-        is, 0.5 is 6 dB less, and 10 ** (x / 20) stands for x decibels."""
+        """Changes what is given; a pose is reached after `glide` seconds. `gain` is a linear factor: 1 keeps the
+        level, 0.5 lowers it by 6 dB, and 10 ** (x / 20) changes it by x decibels."""
         request = checks.message(scene_service_pb2.UpdateObjectRequest, "update", dict(
             name=self.name, material=None if material is None else materials.to_message(material), size=size, gain=gain,
             pose=None if pose is None else contacts.to_pose(pose), glide_s=checks.number(glide, "glide", "seconds"),
@@ -140,9 +140,9 @@ class Scene:
 
     def update(self, *, gain: Optional[float] = None, muted: Optional[bool] = None,
                solo: Optional[bool] = None) -> scene_service_pb2.Scene:
-        """Changes the volume: a linear gain, where 1 leaves the level as it is and 10 ** (x / 20) stands for x
-        decibels; muted, so that the scene rings on unheard; solo, so that of your scenes only those with this flag are
-        heard. Changes glide within 30 ms. Returns the scene's state."""
+        """Changes the volume within 30 ms, and returns the scene's state. `gain` is a linear factor: 1 keeps the level,
+        and 10 ** (x / 20) changes it by x decibels. A `muted` scene rings on unheard. If you set `solo` for some of
+        your scenes, the others are not heard."""
         request = checks.message(scene_service_pb2.UpdateSceneRequest, "update", dict(
             name=self.name, gain=gain, muted=muted, solo=solo))
         with errors.translated(self.client.server):
