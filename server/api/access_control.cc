@@ -80,7 +80,7 @@ std::string BearerToken(const grpc::CallbackServerContext& context) {
 AccessControl::AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log)
     : table_(std::make_shared<const AccessTable>(std::move(table))),
       guesses_(clock),
-      log_(clock, std::move(log)) {}
+      log_(clock, "refused access", std::move(log)) {}
 
 void AccessControl::Replace(AccessTable table) {
   auto replacement = std::make_shared<const AccessTable>(std::move(table));

@@ -105,7 +105,7 @@ struct ApiServer::State {
   State(const ApiSettings& settings, const ServedRooms& rooms, AccessTable table)
       : clock(rooms.clock),
         grpc_log(rooms.clock, rooms.log),
-        client_log(rooms.clock, rooms.log),
+        client_log(rooms.clock, "clients", rooms.log),
         access(std::move(table), rooms.clock, rooms.log),
         limits(settings.client_share),
         leases(rooms.clock, Duration(settings.scene_grace_s),
@@ -160,6 +160,7 @@ struct ApiServer::State {
                      .can_decompose = rooms.can_decompose},
                     rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output),
+        log(rooms.log),
         log_error(rooms.log_error),
         can_decompose(rooms.can_decompose) {}
 
@@ -220,6 +221,7 @@ struct ApiServer::State {
   AudioService audio;
   ServerService server_info;
   LiveOutput& output;
+  const std::function<void(const std::string& line)> log;
   const std::function<void(const std::string& line)> log_error;
   const std::function<bool()> can_decompose;
   /// The credentials of each TCP address.
@@ -287,13 +289,13 @@ void ApiServer::State::Open() {
 void ApiServer::State::KeepClients() {
   client_keeper.Look();
   ShowWorkers(can_decompose());
-  if (const auto warning = certificate_end.WarningDue()) client_log.Warn(*warning);
+  if (const auto warning = certificate_end.WarningDue()) log(*warning);
 }
 
 void ApiServer::State::ShowWorkers(bool can) {
   if (decomposes.exchange(can) == can) return;
   servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
-  if (!can) client_log.Warn("decompositions cannot run: their program is missing");
+  if (!can) log("decompositions cannot run: their program is missing");
 }
 
 void ApiServer::State::ShowDatabase(const absl::Status& files) {

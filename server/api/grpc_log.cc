@@ -35,7 +35,7 @@ void LogProtobuf(google::protobuf::LogLevel level, const char* /*file*/, int /*l
 
 }  // namespace
 
-GrpcLog::GrpcLog(const Clock& clock, LimitedLog::Sink sink) : log_(clock, std::move(sink)) {
+GrpcLog::GrpcLog(const Clock& clock, LimitedLog::Sink sink) : log_(clock, "gRPC", std::move(sink)) {
   const MutexLock lock(&log_mutex);
   present_log = &log_;
   gpr_set_log_function(LogGrpc);

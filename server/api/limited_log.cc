@@ -52,7 +52,7 @@ void LimitedLog::Warn(absl::string_view line) {
 
 void LimitedLog::SayWhatWasLeftOut() {
   if (left_out_count_ == 0) return;
-  sink_(absl::StrCat(left_out_count_, " more lines of this kind were left out"));
+  sink_(absl::StrCat(left_out_count_, " more lines about ", subject_, " were left out"));
   left_out_count_ = 0;
 }
 

@@ -35,16 +35,17 @@ class Allowance {
 };
 
 /// A log that untrusted clients cannot flood. It takes twenty lines at once, then one a second.
-/// Further lines are dropped, and their count is logged before the next line. Bytes that are not
+/// Further lines are dropped, and their count and subject are logged before the next line. Bytes that are not
 /// printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every thread.
 class LimitedLog {
  public:
   using Sink = std::function<void(const std::string&)>;
 
-  /// `clock` must outlive the log.
-  LimitedLog(const Clock& clock, Sink sink) : clock_(clock), sink_(std::move(sink)) {}
+  /// `subject` tells what the lines are about. `clock` must outlive the log.
+  LimitedLog(const Clock& clock, std::string subject, Sink sink)
+      : clock_(clock), subject_(std::move(subject)), sink_(std::move(sink)) {}
 
-  /// Logs the number of lines dropped.
+  /// Logs the number of lines that were dropped since the last one.
   ~LimitedLog();
   LimitedLog(const LimitedLog&) = delete;
   LimitedLog& operator=(const LimitedLog&) = delete;
@@ -55,6 +56,7 @@ class LimitedLog {
   void SayWhatWasLeftOut() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const Clock& clock_;
+  const std::string subject_;
   const Sink sink_;
   Mutex mutex_;
   Allowance lines_ ABSL_GUARDED_BY(mutex_){20};

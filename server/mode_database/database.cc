@@ -2,6 +2,7 @@
 #include "server/mode_database/database.h"
 
 #include <algorithm>
+#include <chrono>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -60,6 +61,16 @@ absl::StatusOr<bool> ShouldShrink(SqliteConnection& writer) {
 bool EmptyLog(SqliteConnection& writer) {
   const absl::StatusOr<int64_t> busy = Figure(writer, "PRAGMA wal_checkpoint(TRUNCATE)");
   return busy.ok() && *busy == 0;
+}
+
+/// Lets the writer wait for other processes for what is left of the longest wait since `asked`. The
+/// changes that queue up while another process holds the database thus all fail at the same time.
+void LimitWait(SqliteConnection& writer, std::chrono::steady_clock::time_point asked) {
+  // SQLite holds locks of its own for moments.
+  constexpr std::chrono::milliseconds kLeast{50};
+  const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::steady_clock::now() - asked);
+  writer.SetLongestWait(std::max(kLeast, SqliteConnection::kLongestWait - waited));
 }
 
 absl::Status Unusable(const std::filesystem::path& file, absl::string_view why) {
@@ -121,7 +132,9 @@ std::string Database::MissingChanges() const {
 }
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
+  const auto asked = std::chrono::steady_clock::now();
   MutexLock lock(&writer_mutex_);
+  LimitWait(*writer_, asked);
   const absl::Status status = WriteLocked(body);
   const bool is_full = ToErrorInfo(status).reason() == "DATABASE_FULL";
   return is_full && MakeSpaceLocked() ? WriteLocked(body) : status;
@@ -132,7 +145,9 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
     return absl::IsResourceExhausted(status) ||
            (absl::IsUnavailable(status) && ToErrorInfo(status).reason() != "DATABASE_BUSY");
   };
+  const auto asked = std::chrono::steady_clock::now();
   MutexLock lock(&writer_mutex_);
+  LimitWait(*writer_, asked);
   absl::Status status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   // After a checkpoint the log is written from its beginning again.

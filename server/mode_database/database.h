@@ -26,7 +26,8 @@ class Database {
 
   /// Runs `body` in one transaction. The transaction is committed and on the disk when Write
   /// returns OK, and rolled back if `body` fails. If the disk is full and MakeSpace frees some
-  /// space, runs `body` again from its beginning.
+  /// space, runs `body` again from its beginning. Waits for other changes, and up to 10 s after the
+  /// call for a lock that another process holds.
   absl::Status Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
   /// Runs `body` in one transaction, as Write does. `body` must be a change that frees space. If

@@ -356,7 +356,6 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
                                               const CollectSettings& settings) {
   // The log of a full disk has room for the deletion of a few models at a time.
   const size_t most = settings.dry_run ? std::numeric_limits<size_t>::max() : 16;
-  MutexLock lock(&cache_mutex_);
   Collected all;
   Collected some;
   do {
@@ -369,27 +368,35 @@ absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
 absl::StatusOr<Collected> ModelStore::CollectSome(uint64_t budget_bytes,
                                                   const CollectSettings& settings, size_t most) {
   Collected collected;
-  const auto collect =
-      [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
-        collected = {};
-        RETURN_IF_ERROR(WriteSounded(connection));
-        std::vector<ModelSize> oldest_first;
-        uint64_t total_bytes = 0;
-        RETURN_IF_ERROR(SelectSizes(connection, [&](const ModelSize& model) {
-          oldest_first.push_back(model);
-          total_bytes += model.bytes;
-        }));
-        for (const ModelSize& model : oldest_first) {
-          if (total_bytes <= budget_bytes || collected.model_count == most) break;
-          if (model.pinned || model.digest == settings.spared || InMemory(model.digest)) continue;
-          if (!settings.dry_run) RETURN_IF_ERROR(DeleteModelRows(connection, model.digest));
-          total_bytes -= model.bytes;
-          collected = {collected.model_count + 1, collected.bytes + model.bytes};
-        }
-        return absl::OkStatus();
-      };
+  std::map<std::string, int64_t> stored;
+  const auto collect = [&](SqliteConnection& connection) {
+    // Nobody who loads a model waits meanwhile for the disk or for another process, because the
+    // transaction has begun.
+    const MutexLock lock(&cache_mutex_);
+    collected = {};
+    stored = sounded_;
+    RETURN_IF_ERROR(WriteSounded(connection));
+    std::vector<ModelSize> oldest_first;
+    uint64_t total_bytes = 0;
+    RETURN_IF_ERROR(SelectSizes(connection, [&](const ModelSize& model) {
+      oldest_first.push_back(model);
+      total_bytes += model.bytes;
+    }));
+    for (const ModelSize& model : oldest_first) {
+      if (total_bytes <= budget_bytes || collected.model_count == most) break;
+      if (model.pinned || model.digest == settings.spared || InMemory(model.digest)) continue;
+      if (!settings.dry_run) RETURN_IF_ERROR(DeleteModelRows(connection, model.digest));
+      total_bytes -= model.bytes;
+      collected = {collected.model_count + 1, collected.bytes + model.bytes};
+    }
+    return absl::OkStatus();
+  };
   RETURN_IF_ERROR(database_->WriteToFree(collect));
-  sounded_.clear();
+  const MutexLock lock(&cache_mutex_);
+  std::erase_if(sounded_, [&](const auto& entry) {
+    const auto same = stored.find(entry.first);
+    return same != stored.end() && same->second == entry.second;
+  });
   return collected;
 }
 

@@ -245,7 +245,7 @@ class ModelStore {
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
   /// Deletes at most `most` models in one transaction.
   absl::StatusOr<Collected> CollectSome(uint64_t budget_bytes, const CollectSettings& settings,
-                                        size_t most) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
+                                        size_t most);
   absl::StatusOr<ModelSummary> Store(absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
                                      ModelSummary named);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);

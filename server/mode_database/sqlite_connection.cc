@@ -14,7 +14,7 @@
 namespace carillon {
 namespace {
 
-constexpr int kBusyTimeoutMs = 10'000;
+constexpr int kBusyTimeoutMs = static_cast<int>(SqliteConnection::kLongestWait.count());
 
 absl::Status ToStatus(const SQLite::Exception& error) {
   const absl::string_view what = error.what();
@@ -164,6 +164,10 @@ absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy,
     }
     return absl::OkStatus();
   });
+}
+
+void SqliteConnection::SetLongestWait(std::chrono::milliseconds wait) {
+  state_->database.setBusyTimeout(static_cast<int>(wait.count()));
 }
 
 int64_t SqliteConnection::changed_row_count() const { return state_->database.getChanges(); }

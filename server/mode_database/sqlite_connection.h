@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <initializer_list>
@@ -37,8 +38,11 @@ class SqlRow {
 /// DataLoss (DATABASE_CORRUPT) or Internal (DATABASE_ERROR).
 class SqliteConnection {
  public:
+  /// How long a new connection waits for a lock that another process holds.
+  static constexpr std::chrono::milliseconds kLongestWait{10'000};
+
   /// Opens the file through the VFS with this name, or SQLite's own if it is empty, and creates the
-  /// file unless it exists. Waits up to 10 s for a lock of another process.
+  /// file unless it exists.
   static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file,
                                                                 const std::string& vfs = "");
   ~SqliteConnection();
@@ -57,6 +61,9 @@ class SqliteConnection {
   /// Copies the snapshot of the present transaction into a new file, piece by piece, while
   /// `goes_on` returns true. Errors: Cancelled if it does not.
   absl::Status BackUpTo(const std::filesystem::path& copy, absl::FunctionRef<bool()> goes_on);
+
+  /// Sets how long the following statements wait for a lock that another process holds.
+  void SetLongestWait(std::chrono::milliseconds wait);
 
   /// Number of rows that the last statement changed.
   int64_t changed_row_count() const;

@@ -102,7 +102,7 @@ class ConnectionGateTest : public testing::Test {
   SystemClock clock_;
   std::counting_semaphore<> logged_{0};
   std::vector<std::string> lines_;
-  LimitedLog log_{clock_, [this](const std::string& line) {
+  LimitedLog log_{clock_, "clients", [this](const std::string& line) {
                     lines_.push_back(line);
                     logged_.release();
                   }};

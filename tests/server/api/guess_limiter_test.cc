@@ -68,7 +68,7 @@ TEST(LimitedLog, LinesBeyondTheLimitAreCountedAndBytesOfStrangersEscaped) {
   ManualClock clock;
   std::vector<std::string> lines;
   {
-    LimitedLog log(clock, [&](const std::string& line) { lines.push_back(line); });
+    LimitedLog log(clock, "strangers", [&](const std::string& line) { lines.push_back(line); });
     log.Warn("\x1b[31m\n" + std::string(1000, 'x'));
     ASSERT_EQ(lines.size(), 1U);
     EXPECT_EQ(lines[0].substr(0, 12), "\\x1b[31m\\nxx");
@@ -78,10 +78,10 @@ TEST(LimitedLog, LinesBeyondTheLimitAreCountedAndBytesOfStrangersEscaped) {
     clock.SleepUntil(clock.Monotonic() + seconds(1));
     log.Warn("at last");
     ASSERT_EQ(lines.size(), 22U);
-    EXPECT_EQ(lines[20], "81 more lines of this kind were left out");
+    EXPECT_EQ(lines[20], "81 more lines about strangers were left out");
     log.Warn("left out");
   }
-  EXPECT_EQ(lines.back(), "1 more lines of this kind were left out");
+  EXPECT_EQ(lines.back(), "1 more lines about strangers were left out");
 }
 
 }  // namespace
