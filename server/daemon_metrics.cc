@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -156,8 +158,14 @@ void AddJobs(Metrics& metrics, const DecompositionQueue::Counts& jobs) {
 }
 
 void AddDatabase(Metrics& metrics, Database& database) {
-  Gauge(metrics, "carillon_database_serving", "1: the database's files are as they should be.",
-        database.CheckFiles().ok() ? 1 : 0);
+  Gauge(metrics, "carillon_database_serving", "1: the database can be changed.",
+        database.CheckState().ok() ? 1 : 0);
+  std::error_code error;
+  const std::filesystem::space_info disk = std::filesystem::space(database.folder(), error);
+  if (!error) {
+    Gauge(metrics, "carillon_disk_free_bytes", "Free space on the disk of the database.",
+          static_cast<double>(disk.available));
+  }
   const absl::StatusOr<DatabaseStats> stats = ReadStats(database);
   if (!stats.ok()) return;
   Gauge(metrics, "carillon_database_bytes", "Size of the database's file.",
@@ -165,6 +173,8 @@ void AddDatabase(Metrics& metrics, Database& database) {
   Gauge(metrics, "carillon_database_free_bytes", "Unused space in it.",
         static_cast<double>(stats->free_bytes));
   Gauge(metrics, "carillon_models", "Modal models.", static_cast<double>(stats->model_count));
+  Gauge(metrics, "carillon_models_quarantined", "Modal models that were found damaged.",
+        static_cast<double>(stats->quarantined_count));
 }
 
 /// Resident memory of this process.
@@ -197,6 +207,8 @@ std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms) {
   AddClients(metrics, rooms.server.clients());
   AddTls(metrics, rooms.server.certificate_left_s());
   AddJobs(metrics, rooms.decompositions.counts());
+  Gauge(metrics, "carillon_decompositions_serving", "1: decompositions can run and be stored.",
+        rooms.server.serves_decompositions() ? 1 : 0);
   AddDatabase(metrics, rooms.database.database());
   Gauge(metrics, "process_resident_memory_bytes", "Resident memory of the daemon alone.",
         ResidentBytes());

@@ -14,6 +14,8 @@ namespace carillon {
 /// only.
 class DataDirectory {
  public:
+  static constexpr char kDatabaseName[] = "carillon.db";
+
   /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,
   /// unless it exists. Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
@@ -21,7 +23,7 @@ class DataDirectory {
   DataDirectory(DataDirectory&& other) noexcept;
   DataDirectory& operator=(DataDirectory&&) = delete;
 
-  std::filesystem::path database_file() const { return path_ / "carillon.db"; }
+  std::filesystem::path database_file() const { return path_ / kDatabaseName; }
   /// The folder for the files of running decompositions.
   std::filesystem::path work_directory() const { return path_ / "work"; }
 

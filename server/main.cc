@@ -19,6 +19,7 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/api_server.h"
@@ -281,23 +282,62 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                options, read_options, guard);
 }
 
+/// Prints what a database has, if it can be read.
+void PrintContents(const std::filesystem::path& file) {
+  const auto database = Database::Open(file);
+  const auto stats = database.ok() ? ReadStats(**database) : database.status();
+  if (!stats.ok()) return;
+  std::cout << "models: " << stats->model_count << ", meshes: " << stats->mesh_count
+            << ", jobs: " << stats->job_count << std::endl;
+}
+
+/// Says how many faults a check or a repair has found.
+absl::Status Conclude(int finding_count, absl::string_view outcome) {
+  std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
+  if (finding_count == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT", outcome);
+}
+
+absl::Status Check(const std::filesystem::path& file, const OnFinding& on_finding) {
+  RETURN_IF_ERROR(CheckDatabase(file, on_finding));
+  PrintContents(file);
+  return absl::OkStatus();
+}
+
+/// Prints what the database has now, and where the old one is.
+absl::Status Report(const std::filesystem::path& file, const std::filesystem::path& kept) {
+  PrintContents(file);
+  if (!kept.empty()) std::cout << "the old database is kept as " << kept.string() << std::endl;
+  return absl::OkStatus();
+}
+
 /// Runs `carillond db check|repair|restore`.
 absl::Status RunDatabaseCommand(const CommandLine& command) {
-  ASSIGN_OR_RETURN(const DataDirectory directory,
-                   DataDirectory::Open(command.options.data_directory));
+  const std::filesystem::path folder = command.options.data_directory;
+  const bool restores = command.database_command == "restore";
+  if (!restores && !std::filesystem::exists(folder / DataDirectory::kDatabaseName)) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat("there is no database ", DataDirectory::kDatabaseName, " in ",
+                                folder.string(), ": name its folder with --data-dir"));
+  }
+  ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(folder));
   int finding_count = 0;
   const auto on_finding = [&](const std::string& line) {
     ++finding_count;
     std::cout << line << std::endl;
   };
   const std::filesystem::path file = directory.database_file();
-  if (command.database_command == "restore") return RestoreDatabase(file, command.backup_file);
-  RETURN_IF_ERROR(command.database_command == "check" ? CheckDatabase(file, on_finding)
-                                                      : RepairDatabase(file, on_finding));
-  std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
-  if (command.database_command == "repair" || finding_count == 0) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                 "the faults above were found: `carillond db repair` keeps all undamaged rows");
+  if (command.database_command == "check") {
+    RETURN_IF_ERROR(Check(file, on_finding));
+    return Conclude(finding_count,
+                    "the faults above were found: `carillond db repair` keeps all undamaged rows");
+  }
+  ASSIGN_OR_RETURN(const std::filesystem::path kept,
+                   restores ? RestoreDatabase(file, command.backup_file)
+                            : RepairDatabase(file, on_finding));
+  RETURN_IF_ERROR(Report(file, kept));
+  if (restores) return absl::OkStatus();
+  return Conclude(finding_count, "what the lines above name is lost; all else was kept");
 }
 
 int Main(int argc, const char* const* argv) {

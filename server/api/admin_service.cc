@@ -59,9 +59,13 @@ class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
       std::filesystem::remove(copy, ignored);  // an open file stays readable
     };
     RETURN_IF_ERROR(BackUp(database_, copy, [this] { return !is_cancelled(); }));
-    byte_count_ = std::filesystem::file_size(copy);
     pieces_.Open(copy);
-    return absl::OkStatus();
+    std::error_code error;
+    byte_count_ = std::filesystem::file_size(copy, error);
+    if (!error) return absl::OkStatus();
+    return Refusal(absl::StatusCode::kUnavailable, "DATABASE_IO_ERROR",
+                   absl::StrCat("the unfinished backup ", copy.string(), " has gone (",
+                                error.message(), "): ask for another"));
   }
 
   absl::StatusOr<Supply> FillNext(v1::BackUpDatabaseResponse& response) override {

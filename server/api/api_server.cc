@@ -113,7 +113,7 @@ struct ApiServer::State {
         owners(access, leases, rooms.scenes),
         certificate_end(rooms.clock),
         database_keeper(rooms.database.database(),
-                        [this](const absl::Status& files) { ShowDatabase(files); }),
+                        [this](const absl::Status& state) { ShowDatabase(state); }),
         client_keeper({.scenes = rooms.scenes,
                        .owners = owners,
                        .idle_calls = idle_calls,
@@ -182,9 +182,9 @@ struct ApiServer::State {
   /// impossible.
   void ShowWorkers(bool can);
 
-  /// Sets the health of ModalModelService and DecompositionService, and logs which of the
-  /// database's files are lost.
-  void ShowDatabase(const absl::Status& files);
+  /// Sets the health of ModalModelService and DecompositionService, and logs why the database cannot
+  /// be changed, or that it can be changed again.
+  void ShowDatabase(const absl::Status& state);
 
   const Clock& clock;
   GrpcLog grpc_log;
@@ -298,11 +298,12 @@ void ApiServer::State::ShowWorkers(bool can) {
   if (!can) log("decompositions cannot run: their program is missing");
 }
 
-void ApiServer::State::ShowDatabase(const absl::Status& files) {
-  servers->SetHealth(v1::ModalModelService::service_full_name(), files.ok());
-  stores = files.ok();
+void ApiServer::State::ShowDatabase(const absl::Status& state) {
+  servers->SetHealth(v1::ModalModelService::service_full_name(), state.ok());
+  const bool stored = stores.exchange(state.ok());
   servers->SetHealth(v1::DecompositionService::service_full_name(), stores && decomposes);
-  if (!files.ok()) log_error(std::string(files.message()));
+  if (!state.ok()) log_error(std::string(state.message()));
+  if (state.ok() && !stored) log("the database can be changed again");
 }
 
 absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& settings,
@@ -354,6 +355,8 @@ ClientCounts ApiServer::clients() const {
           .listeners = limits.count(Holding::kListener),
           .renderings = limits.count(Holding::kRendering)};
 }
+
+bool ApiServer::serves_decompositions() const { return state_->stores && state_->decomposes; }
 
 std::optional<double> ApiServer::certificate_left_s() const {
   return state_->certificate_end.left_s();

@@ -54,7 +54,7 @@ struct ServedRooms {
   LiveOutput& output;
   Clock& clock;
   std::function<void(const std::string& line)> log;  ///< takes warnings
-  /// Takes lines that say which of the database's files are lost.
+  /// Takes lines that say why the database cannot be changed.
   std::function<void(const std::string& line)> log_error = [](const std::string&) {};
   /// Returns whether decompositions can run. Called several times a second.
   std::function<bool()> can_decompose = [] { return true; };
@@ -70,7 +70,7 @@ struct ClientCounts {
 
 /// A gRPC server with all services of carillon.v1, health and reflection. The health of
 /// carillon.v1.AudioService is NOT_SERVING while the wanted sound device does not play, that of
-/// carillon.v1.ModalModelService while files of the database are lost, and that of
+/// carillon.v1.ModalModelService while the database cannot be changed, and that of
 /// carillon.v1.DecompositionService also while decompositions cannot run. The health of the whole
 /// server ("") is SERVING.
 class ApiServer {
@@ -96,6 +96,9 @@ class ApiServer {
   absl::Status Reload(const ApiSettings& settings);
 
   ClientCounts clients() const;
+
+  /// Returns whether decompositions can run and their results be stored.
+  bool serves_decompositions() const;
 
   /// Returns the seconds until the first of the daemon's certificates expires, or nothing without
   /// TLS.

@@ -2,14 +2,17 @@
 #include "server/mode_database/database.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/mode_database/database_replacement.h"
 #include "server/mode_database/schema.h"
 
 namespace carillon {
@@ -24,10 +27,12 @@ constexpr size_t kMostIdleReaders = 4;
 // Only the writer sets auto_vacuum, with which a new file can shrink: on an existing file this
 // pragma is a write, and a reader would wait for the writer. Changes go from the log into the file
 // whenever the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a
-// crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again.
+// crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again. Debian's
+// SQLite overwrites what is deleted with zeros, for which a full disk has no space in the log; with
+// secure_delete = FAST a deletion writes no page for that alone.
 constexpr char kWriter[] =
     "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64; "
-    "PRAGMA journal_size_limit = 16777216;";
+    "PRAGMA journal_size_limit = 16777216; PRAGMA secure_delete = FAST;";
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
                                                           const char* first = kReader,
@@ -63,14 +68,30 @@ bool EmptyLog(SqliteConnection& writer) {
   return busy.ok() && *busy == 0;
 }
 
+/// SQLite holds locks of its own for moments.
+constexpr std::chrono::milliseconds kMoment{50};
+
 /// Lets the writer wait for other processes for what is left of the longest wait since `asked`. The
 /// changes that queue up while another process holds the database thus all fail at the same time.
 void LimitWait(SqliteConnection& writer, std::chrono::steady_clock::time_point asked) {
-  // SQLite holds locks of its own for moments.
-  constexpr std::chrono::milliseconds kLeast{50};
   const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::steady_clock::now() - asked);
-  writer.SetLongestWait(std::max(kLeast, SqliteConnection::kLongestWait - waited));
+  writer.SetLongestWait(std::max(kMoment, SqliteConnection::kLongestWait - waited));
+}
+
+/// With less free space the disk counts as full, after a change has failed for want of space.
+constexpr uintmax_t kLeastFreeBytes = 4 << 20;
+
+uintmax_t FreeBytes(const std::filesystem::path& folder) {
+  std::error_code error;
+  const std::filesystem::space_info space = std::filesystem::space(folder, error);
+  return error ? 0 : space.available;
+}
+
+absl::Status DiskFull(const std::filesystem::path& file) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+                 absl::StrCat("no space is left on the disk of ", file.string(),
+                              ": free some, or delete models"));
 }
 
 absl::Status Unusable(const std::filesystem::path& file, absl::string_view why) {
@@ -97,6 +118,7 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::error_code error;
   std::filesystem::create_directories(absolute.parent_path(), error);
   if (error) return Unusable(absolute, error.message());
+  RETURN_IF_ERROR(CompleteReplacement(absolute));
   std::unique_ptr<Database> database(new Database(absolute));
   RETURN_IF_ERROR(database->ConnectWriter());
   RETURN_IF_ERROR(database->ReadChangeCount());
@@ -106,6 +128,10 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
 absl::Status Database::ConnectWriter() {
   const MutexLock lock(&writer_mutex_);
   auto connection = Connect(file_, kWriter, files_.vfs_name());
+  if (ToErrorInfo(connection.status()).reason() == "DATABASE_FULL") {
+    reserve_.Release();
+    connection = Connect(file_, kWriter, files_.vfs_name());
+  }
   const absl::Status status = connection.status();
   if (absl::IsInternal(status) || absl::IsFailedPrecondition(status)) {
     return Unusable(file_, status.message());
@@ -176,10 +202,40 @@ absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnecti
     return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
                           {std::to_string(++change_count)});
   };
-  RETURN_IF_ERROR(files_.Change([&] { return InTransaction(writer, "BEGIN IMMEDIATE", change); }));
+  const absl::Status status =
+      files_.Change([&] { return InTransaction(writer, "BEGIN IMMEDIATE", change); });
+  RememberFailure(status);
+  if (!status.ok()) return status;
   if (change_count != change_count_) change_count_file_.Write(change_count);
   change_count_ = change_count;
   return absl::OkStatus();
+}
+
+void Database::RememberFailure(const absl::Status& status) {
+  constexpr std::array<absl::string_view, 4> kConcernEveryChange = {
+      "DATABASE_FULL", "DATABASE_BUSY", "DATABASE_IO_ERROR", "DATABASE_CORRUPT"};
+  const std::string reason = ToErrorInfo(status).reason();
+  const MutexLock lock(&failure_mutex_);
+  if (status.ok() || absl::c_linear_search(kConcernEveryChange, reason)) failure_ = status;
+}
+
+absl::Status Database::CheckState() {
+  RETURN_IF_ERROR(files_.Check());
+  const MutexLock lock(&failure_mutex_);
+  return failure_;
+}
+
+absl::Status Database::TryAgain() {
+  absl::Status state = CheckState();
+  const std::string reason = ToErrorInfo(state).reason();
+  if (state.ok() || reason == "DATABASE_LOST") return state;
+  if (reason == "DATABASE_FULL" && FreeBytes(folder()) < kLeastFreeBytes) return state;
+  MutexLock lock(&writer_mutex_);
+  writer_->SetLongestWait(kMoment);
+  WriteLocked([](SqliteConnection& connection) {
+    return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('tried_again', '')");
+  }).IgnoreError();
+  return CheckState();
 }
 
 absl::Status Database::Tidy() {
@@ -224,7 +280,11 @@ bool Database::MakeSpaceLocked() {
 
 absl::StatusOr<SpoolFile> Database::MakeSpool() {
   RETURN_IF_ERROR(files_.Check());
-  return SpoolFile::Make(folder(), [this] { return MakeSpace(); });
+  return SpoolFile::Make(folder(), [this] {
+    const bool made = MakeSpace();
+    if (!made) RememberFailure(DiskFull(file_));
+    return made;
+  });
 }
 
 absl::Status Database::Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {

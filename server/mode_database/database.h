@@ -34,9 +34,15 @@ class Database {
   /// the disk is full, makes room for the change and runs `body` again.
   absl::Status WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
-  /// Checks that the files are in place. Errors: FailedPrecondition (DATABASE_LOST). After this
-  /// error every Write fails with DATABASE_LOST.
-  absl::Status CheckFiles() { return files_.Check(); }
+  /// Returns OK if the database can be changed, as far as is known without a change. Errors:
+  /// FailedPrecondition (DATABASE_LOST: a file is not in place; after this error every Write fails
+  /// with DATABASE_LOST), and the error of the last change if other changes would probably meet it
+  /// too: DATABASE_FULL, DATABASE_BUSY, DATABASE_IO_ERROR or DATABASE_CORRUPT.
+  absl::Status CheckState();
+
+  /// Returns what CheckState returns. If the last change failed, first makes a small change to see
+  /// whether the database can be changed again.
+  absl::Status TryAgain();
 
   /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
   /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
@@ -49,7 +55,7 @@ class Database {
   bool MakeSpace();
 
   /// Makes a temporary file in the folder of the database. The file calls MakeSpace when the disk
-  /// is full. Errors: those of CheckFiles and of SpoolFile::Make.
+  /// is full. Errors: DATABASE_LOST, and those of SpoolFile::Make.
   absl::StatusOr<SpoolFile> MakeSpool();
 
   /// Returns a text with the number of changes that were acknowledged once but are missing from the
@@ -73,6 +79,7 @@ class Database {
   absl::Status ReadChangeCount();
   absl::Status WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
+  void RememberFailure(const absl::Status& status);
   bool MakeSpaceLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
   absl::StatusOr<std::unique_ptr<SqliteConnection>> TakeReader();
 
@@ -84,6 +91,8 @@ class Database {
   Mutex writer_mutex_;
   int64_t change_count_ ABSL_GUARDED_BY(writer_mutex_) = 0;
   std::unique_ptr<SqliteConnection> writer_ ABSL_PT_GUARDED_BY(writer_mutex_);
+  Mutex failure_mutex_;
+  absl::Status failure_ ABSL_GUARDED_BY(failure_mutex_);
   Mutex readers_mutex_;
   std::vector<std::unique_ptr<SqliteConnection>> idle_readers_ ABSL_GUARDED_BY(readers_mutex_);
 };

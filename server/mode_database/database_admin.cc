@@ -144,8 +144,9 @@ absl::StatusOr<DatabaseStats> ReadStats(Database& database) {
 
 absl::Status BackUp(Database& database, const std::filesystem::path& copy,
                     absl::FunctionRef<bool()> goes_on) {
-  return database.Read(
-      [&](SqliteConnection& connection) { return connection.BackUpTo(copy, goes_on); });
+  RETURN_IF_ERROR(database.Read(
+      [&](SqliteConnection& connection) { return connection.BackUpTo(copy, goes_on); }));
+  return SqliteConnection::CheckStructure(copy, goes_on);
 }
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {

@@ -30,8 +30,9 @@ struct DatabaseStats {
 absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 
 /// Copies one snapshot of the database into a new file (SQLite's online backup) while writers go
-/// on. Stops soon after `goes_on` has returned false. Errors: Cancelled (stopped),
-/// ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE).
+/// on, and checks the structure of the copy. Stops soon after `goes_on` has returned false. Errors:
+/// Cancelled (stopped), ResourceExhausted (DATABASE_FULL), FailedPrecondition (DATABASE_UNUSABLE),
+/// DataLoss (DATABASE_CORRUPT: the copy is damaged, usually because the database is).
 absl::Status BackUp(Database& database, const std::filesystem::path& copy,
                     absl::FunctionRef<bool()> goes_on);
 
@@ -46,13 +47,17 @@ using OnFinding = std::function<void(const std::string& line)>;
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
 /// Copies every undamaged model, mesh and job into a new database, which replaces the old one.
-/// Keeps the old database as `file`.damaged. `on_finding` gets each row that is left out. Errors:
-/// FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
-absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
+/// `on_finding` gets each row that is left out. Returns the name under which the old database is
+/// kept: `file`.damaged, or `file`.damaged-2 and so on if that exists. Errors: FailedPrecondition
+/// (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL).
+absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& file,
+                                                     const OnFinding& on_finding);
 
-/// Replaces the database by a copy that BackUp made, after a check of the copy. The old database is
-/// kept as `file`.replaced. Errors: NotFound (FILE_NOT_FOUND), DataLoss
-/// (DATABASE_CORRUPT), FailedPrecondition (SCHEMA_TOO_NEW).
-absl::Status RestoreDatabase(const std::filesystem::path& file, const std::filesystem::path& copy);
+/// Replaces the database by a copy that BackUp made, after a check of the copy. Returns the name
+/// under which the old database is kept, `file`.replaced or `file`.replaced-2 and so on, or an empty
+/// path if there was none. Errors: NotFound (FILE_NOT_FOUND), DataLoss (DATABASE_CORRUPT),
+/// FailedPrecondition (SCHEMA_TOO_NEW).
+absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::path& file,
+                                                      const std::filesystem::path& copy);
 
 }  // namespace carillon

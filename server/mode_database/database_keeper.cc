@@ -4,11 +4,11 @@
 namespace carillon {
 
 void DatabaseKeeper::Look() {
-  const absl::Status files = database_.CheckFiles();
-  if (last_ != files) observer_(files);
-  last_ = files;
+  const absl::Status state = database_.TryAgain();
+  if (last_ != state) observer_(state);
+  last_ = state;
   // Pages that cannot be freed now are tried again at the next look.
-  if (files.ok()) database_.Tidy().IgnoreError();
+  if (state.ok()) database_.Tidy().IgnoreError();
 }
 
 }  // namespace carillon

@@ -10,13 +10,13 @@
 
 namespace carillon {
 
-/// Calls Database::CheckFiles, and gives free pages back to the disk. DatabaseFiles says which
-/// files are checked, and how.
+/// Looks whether the database can be changed (Database::TryAgain), and gives free pages back to the
+/// disk.
 class DatabaseKeeper {
  public:
-  /// Takes the first result of Database::CheckFiles, and each result that differs from the previous
+  /// Takes the first result of Database::TryAgain, and each result that differs from the previous
   /// one.
-  using Observer = std::function<void(const absl::Status& files)>;
+  using Observer = std::function<void(const absl::Status& state)>;
 
   /// `database` must outlive the keeper.
   DatabaseKeeper(Database& database, Observer observer)

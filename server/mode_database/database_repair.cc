@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cstdint>
+#include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -12,6 +16,7 @@
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_contents.h"
+#include "server/mode_database/database_replacement.h"
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/mesh_store.h"
 #include "server/mode_database/model_sql.h"
@@ -22,26 +27,10 @@
 namespace carillon {
 namespace {
 
-absl::Status CannotMove(const std::filesystem::path& file, const std::error_code& error) {
+absl::Status CannotCopy(const std::filesystem::path& file, const std::error_code& error) {
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
-                              "): see that this user may write in its folder"));
-}
-
-// Moves the database file, its write-ahead log and its count of changes, if there are any.
-absl::Status Move(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::error_code error;
-  for (const char* suffix : {"", "-wal", "-count"}) {
-    const std::filesystem::path source = from.string() + suffix;
-    if (std::filesystem::exists(source)) {
-      std::filesystem::rename(source, to.string() + suffix, error);
-      if (error) return CannotMove(source, error);
-    } else {
-      std::filesystem::remove(to.string() + suffix, error);
-    }
-  }
-  std::filesystem::remove(from.string() + "-shm", error);
-  return absl::OkStatus();
+                 absl::StrCat(file.string(), " cannot be copied (", error.message(),
+                              "): see that this user may read it, and write in the data folder"));
 }
 
 void Remove(const std::filesystem::path& file) {
@@ -123,27 +112,55 @@ absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding
     for (const std::string& digest : Names(from, kind.table, on_finding)) {
       absl::Status status = kind.copy(from, to, digest);
       if (absl::IsResourceExhausted(status)) return status;
-      if (!status.ok()) on_finding(absl::StrCat("left out: ", std::string(status.message())));
+      if (status.ok()) continue;
+      on_finding(absl::StrCat("left out of ", kind.table, ": ", digest, ": ",
+                              std::string(status.message())));
     }
   }
   return absl::OkStatus();
 }
 
+/// Appends zeros to a file that somebody has cut short, because SQLite reads nothing of such a file.
+/// The pages that are lost are then found damaged, and all others are kept.
+absl::Status ExtendCutFile(const std::filesystem::path& file) {
+  const auto number = [](std::span<const unsigned char> bytes) {
+    uint64_t value = 0;
+    for (const unsigned char byte : bytes) value = value << 8U | byte;
+    return value;
+  };
+  std::error_code error;
+  std::array<unsigned char, 32> header{};
+  std::ifstream(file, std::ios::binary).read(reinterpret_cast<char*>(header.data()), header.size());
+  // https://www.sqlite.org/fileformat.html#the_database_header: the page size, where 1 stands for
+  // 65,536, and the number of pages.
+  const uint64_t page_field = number(std::span(header).subspan(16, 2));
+  const uint64_t page_count = number(std::span(header).subspan(28, 4));
+  const uint64_t whole = (page_field == 1 ? 65'536 : page_field) * page_count;
+  const uint64_t size = std::filesystem::file_size(file, error);
+  if (error || size < header.size() || size >= whole) return absl::OkStatus();
+  std::filesystem::resize_file(file, whole, error);
+  return error ? CannotCopy(file, error) : absl::OkStatus();
+}
+
 }  // namespace
 
-absl::Status RepairDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
+absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& file,
+                                                     const OnFinding& on_finding) {
+  RETURN_IF_ERROR(CompleteReplacement(file));
   const std::filesystem::path fresh = file.string() + ".repaired";
   Remove(fresh);
+  RETURN_IF_ERROR(ExtendCutFile(file));
   {
     ASSIGN_OR_RETURN(const std::unique_ptr<Database> from, Database::Open(file));
     ASSIGN_OR_RETURN(const std::unique_ptr<Database> to, Database::Open(fresh));
     RETURN_IF_ERROR(CopyWhole(*from, *to, on_finding));
   }
-  RETURN_IF_ERROR(Move(file, file.string() + ".damaged"));
-  return Move(fresh, file);
+  return ReplaceDatabase(file, fresh, "damaged");
 }
 
-absl::Status RestoreDatabase(const std::filesystem::path& file, const std::filesystem::path& copy) {
+absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::path& file,
+                                                      const std::filesystem::path& copy) {
+  RETURN_IF_ERROR(CompleteReplacement(file));
   std::error_code error;
   const std::filesystem::path incoming = file.string() + ".incoming";
   Remove(incoming);
@@ -153,7 +170,7 @@ absl::Status RestoreDatabase(const std::filesystem::path& file, const std::files
   }
   std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
   std::filesystem::copy_file(copy, incoming, error);
-  if (error) return CannotMove(copy, error);
+  if (error) return CannotCopy(copy, error);
   std::string first_finding;
   absl::Status status = CheckDatabase(incoming, [&](const std::string& line) {
     if (first_finding.empty()) first_finding = line;
@@ -163,11 +180,8 @@ absl::Status RestoreDatabase(const std::filesystem::path& file, const std::files
                      absl::StrCat(copy.string(), " is damaged (", first_finding,
                                   "): take an older copy, or repair this one first"));
   }
-  if (status.ok() && std::filesystem::exists(file)) {
-    status = Move(file, file.string() + ".replaced");
-  }
-  if (status.ok()) status = Move(incoming, file);
-  if (!status.ok()) Remove(incoming);
+  if (status.ok()) return ReplaceDatabase(file, incoming, "replaced");
+  Remove(incoming);
   return status;
 }
 

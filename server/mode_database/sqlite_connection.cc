@@ -7,7 +7,9 @@
 
 #include <utility>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -15,6 +17,33 @@ namespace carillon {
 namespace {
 
 constexpr int kBusyTimeoutMs = static_cast<int>(SqliteConnection::kLongestWait.count());
+
+absl::Status Damaged(absl::string_view what) {
+  return Refusal(
+      absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+      absl::StrCat("the database file is damaged, or the disk under it fails (", what,
+                   "): see the system's log; then stop the daemon, and run carillond db repair or "
+                   "carillond db restore"));
+}
+
+absl::Status NobodyWaits() { return absl::CancelledError("nobody waits for the copy any more"); }
+
+/// A URI of SQLite for a file that nobody changes. No lock is taken, and no file is made beside it.
+std::string UriOf(const std::filesystem::path& file) {
+  std::string uri = "file:";
+  for (const char byte : std::filesystem::absolute(file).string()) {
+    const bool is_plain = absl::ascii_isalnum(static_cast<unsigned char>(byte)) || byte == '/';
+    absl::StrAppend(&uri, is_plain ? std::string(1, byte)
+                                   : absl::StrFormat("%%%02X", static_cast<unsigned char>(byte)));
+  }
+  return uri + "?immutable=1";
+}
+
+absl::Status Full(absl::string_view what) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+                 absl::StrCat("no space is left for the database (", what,
+                              "): free some, or delete models"));
+}
 
 absl::Status ToStatus(const SQLite::Exception& error) {
   const absl::string_view what = error.what();
@@ -29,14 +58,10 @@ absl::Status ToStatus(const SQLite::Exception& error) {
                      absl::StrCat("the daemon has not enough memory for its database (", what,
                                   "): ask for less, or give the daemon more memory"));
     case SQLITE_FULL:
-      return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
-                     absl::StrCat("no space is left for the database (", what,
-                                  "): free some, or delete models"));
+      return Full(what);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-      return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                     absl::StrCat("the database file is damaged (", what,
-                                  "): restore it from a copy, or move it away to start anew"));
+      return Damaged(what);
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
@@ -44,6 +69,8 @@ absl::Status ToStatus(const SQLite::Exception& error) {
                      absl::StrCat("the database cannot be opened or written (", what,
                                   "): see that this user may write in its folder"));
     case SQLITE_IOERR:
+      // The file of shared memory is made as large as it is needed, unless the disk is full.
+      if (error.getExtendedErrorCode() == SQLITE_IOERR_SHMSIZE) return Full(what);
       return Refusal(absl::StatusCode::kUnavailable, "DATABASE_IO_ERROR",
                      absl::StrCat("the disk under the database fails (", what,
                                   "): see the system's log, and try again"));
@@ -158,12 +185,27 @@ absl::Status SqliteConnection::BackUpTo(const std::filesystem::path& copy,
     SQLite::Backup backup(target, state_->database);
     int result = SQLITE_OK;
     while (result != SQLITE_DONE) {
-      if (!goes_on()) return absl::CancelledError("nobody waits for the copy any more");
+      if (!goes_on()) return NobodyWaits();
       result = backup.executeStep(kPages);
       if (result == SQLITE_BUSY || result == SQLITE_LOCKED) sqlite3_sleep(kPauseMs);
     }
     return absl::OkStatus();
   });
+}
+
+absl::Status SqliteConnection::CheckStructure(const std::filesystem::path& copy,
+                                              absl::FunctionRef<bool()> goes_on) {
+  constexpr int kInstructions = 10'000;  // between two calls of `goes_on`
+  const auto is_over = [](void* asked) {
+    return (*static_cast<absl::FunctionRef<bool()>*>(asked))() ? 0 : 1;
+  };
+  absl::Status status = Guarded([&]() -> absl::Status {
+    SQLite::Database database(UriOf(copy), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    sqlite3_progress_handler(database.getHandle(), kInstructions, is_over, &goes_on);
+    const std::string fault = database.execAndGet("PRAGMA quick_check(1)").getString();
+    return fault == "ok" ? absl::OkStatus() : Damaged(fault);
+  });
+  return goes_on() ? status : NobodyWaits();
 }
 
 void SqliteConnection::SetLongestWait(std::chrono::milliseconds wait) {

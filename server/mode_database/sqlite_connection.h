@@ -62,6 +62,11 @@ class SqliteConnection {
   /// `goes_on` returns true. Errors: Cancelled if it does not.
   absl::Status BackUpTo(const std::filesystem::path& copy, absl::FunctionRef<bool()> goes_on);
 
+  /// Checks the structure of a file that nobody changes, while `goes_on` returns true. Errors:
+  /// DataLoss (DATABASE_CORRUPT), Cancelled.
+  static absl::Status CheckStructure(const std::filesystem::path& copy,
+                                     absl::FunctionRef<bool()> goes_on);
+
   /// Sets how long the following statements wait for a lock that another process holds.
   void SetLongestWait(std::chrono::milliseconds wait);
 

@@ -55,7 +55,7 @@ class DatabaseFilesTest : public ::testing::Test {
     EXPECT_THAT(database_->meshes().Put("solid").status().ToString(), HasSubstr("DATABASE_LOST: "));
     EXPECT_THAT(database_->models().Delete(Sha256Hex("kept")).ToString(),
                 HasSubstr("DATABASE_LOST: "));
-    EXPECT_FALSE(database_->database().CheckFiles().ok());
+    EXPECT_FALSE(database_->database().CheckState().ok());
   }
 
   TemporaryFolder folder_;
@@ -123,7 +123,7 @@ TEST_F(DatabaseFilesTest, ALostDatabaseIsNotWrittenAtTheEnd) {
   // A log of zeros, as somebody makes it by truncating a file and making it long again.
   const uintmax_t size = std::filesystem::file_size(log_);
   std::filesystem::resize_file(log_, 0);
-  EXPECT_FALSE(database_->database().CheckFiles().ok());
+  EXPECT_FALSE(database_->database().CheckState().ok());
   std::filesystem::resize_file(log_, size);
   database_.reset();
   EXPECT_EQ(ReadBytes(file_), whole);
@@ -253,7 +253,7 @@ TEST_F(DatabaseFilesTest, AFileThatItsDaemonMakesSmallerIsNotLost) {
   WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
   std::atomic<bool> done = false;
   std::thread checker([&] {
-    while (!done && database_->database().CheckFiles().ok()) {
+    while (!done && database_->database().CheckState().ok()) {
     }
   });
   for (int round = 0; round < 5; ++round) {
@@ -265,7 +265,7 @@ TEST_F(DatabaseFilesTest, AFileThatItsDaemonMakesSmallerIsNotLost) {
   }
   done = true;
   checker.join();
-  EXPECT_TRUE(database_->database().CheckFiles().ok());
+  EXPECT_TRUE(database_->database().CheckState().ok());
 }
 
 TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/mode_database/database_replacement.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <fstream>
+#include <string>
+#include <system_error>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon {
+namespace {
+
+using std::filesystem::path;
+
+/// A file that exists from the moment when the new database is whole on the disk until it has taken
+/// its place. It has two lines: the names of the new database and of the kept one.
+path MarkerOf(const path& file) { return file.string() + "-replacement"; }
+
+absl::Status CannotMove(const path& file, const std::error_code& error) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
+                              "): see that this user may write in its folder"));
+}
+
+/// Waits until a file or folder is on the disk.
+absl::Status Sync(const path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const absl::Cleanup close_it = [descriptor] { close(descriptor); };
+  if (descriptor >= 0 && fsync(descriptor) == 0) return absl::OkStatus();
+  return CannotMove(file, std::error_code(errno, std::generic_category()));
+}
+
+absl::Status Rename(const path& from, const path& to) {
+  std::error_code error;
+  std::filesystem::rename(from, to, error);
+  return error ? CannotMove(from, error) : absl::OkStatus();
+}
+
+/// Gives a file a second name. Copies the file where the file system has no hard links.
+absl::Status Link(const path& from, const path& to) {
+  std::error_code error;
+  if (std::filesystem::exists(to) || !std::filesystem::exists(from)) return absl::OkStatus();
+  std::filesystem::create_hard_link(from, to, error);
+  if (!error) return absl::OkStatus();
+  const path part = to.string() + ".part";
+  std::filesystem::copy_file(from, part, std::filesystem::copy_options::overwrite_existing, error);
+  return error ? CannotMove(from, error) : Rename(part, to);
+}
+
+/// Returns the first name for a kept database that nothing has.
+path NewName(const path& file, const std::string& kind) {
+  path name = file.string() + "." + kind;
+  for (int number = 2; std::filesystem::exists(std::filesystem::symlink_status(name)); ++number) {
+    name = absl::StrCat(file.string(), ".", kind, "-", number);
+  }
+  return name;
+}
+
+absl::Status WriteMarker(const path& file, const path& fresh, const path& kept) {
+  const path part = MarkerOf(file).string() + ".part";
+  {
+    std::ofstream marker(part);
+    marker << fresh.filename().string() << '\n' << kept.filename().string() << '\n';
+  }
+  RETURN_IF_ERROR(Sync(part));
+  RETURN_IF_ERROR(Rename(part, MarkerOf(file)));
+  return Sync(file.parent_path());
+}
+
+}  // namespace
+
+absl::Status CompleteReplacement(const path& file) {
+  std::ifstream marker(MarkerOf(file));
+  std::string fresh_name;
+  std::string kept_name;
+  if (!std::getline(marker, fresh_name) || !std::getline(marker, kept_name)) {
+    return absl::OkStatus();
+  }
+  const path fresh = file.parent_path() / fresh_name;
+  const path kept = file.parent_path() / kept_name;
+  std::error_code ignored;
+  // Each step may have been done before.
+  if (std::filesystem::exists(fresh)) {
+    for (const char* suffix : {"-wal", "-count", ""}) {
+      RETURN_IF_ERROR(Link(file.string() + suffix, kept.string() + suffix));
+    }
+    // The log of the old database must not be applied to the new one.
+    for (const char* suffix : {"-wal", "-shm"}) {
+      std::filesystem::remove(file.string() + suffix, ignored);
+    }
+    RETURN_IF_ERROR(Rename(fresh, file));
+  }
+  const path fresh_count = fresh.string() + "-count";
+  if (std::filesystem::exists(fresh_count)) {
+    RETURN_IF_ERROR(Rename(fresh_count, file.string() + "-count"));
+  }
+  RETURN_IF_ERROR(Sync(file.parent_path()));
+  std::filesystem::remove(MarkerOf(file), ignored);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<path> ReplaceDatabase(const path& file, const path& fresh, const std::string& kind) {
+  const path absolute = std::filesystem::absolute(file);
+  const bool existed = std::filesystem::exists(absolute);
+  const path kept = NewName(absolute, kind);
+  RETURN_IF_ERROR(Sync(fresh));
+  RETURN_IF_ERROR(WriteMarker(absolute, fresh, kept));
+  RETURN_IF_ERROR(CompleteReplacement(absolute));
+  return existed ? kept : path();
+}
+
+}  // namespace carillon
