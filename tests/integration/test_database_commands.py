@@ -43,9 +43,9 @@ class DatabaseCommandsTest(unittest.TestCase):
     def stats(self):
         return json.loads(self.run_command("--json", "db", "stats"))
 
-    def offline(self, *arguments):
-        """carillond db ... on the folder of the daemon, which is stopped."""
-        return subprocess.run([BIN / "carillond", "--data-dir", self.folder / "data", "db",
+    def offline(self, *arguments, folder=None):
+        """carillond db ... on a folder, by default that of the daemon, which is stopped."""
+        return subprocess.run([BIN / "carillond", "--data-dir", folder or self.folder / "data", "db",
                                *map(str, arguments)], capture_output=True, text=True, check=False)
 
     def flip_a_bit(self, file="data/carillon.db"):
@@ -149,7 +149,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         copy = self.folder / f"{digest}.model"
         copy.write_bytes(self.model_file.read_bytes())
         self.daemon.stop()
-        self.assertEqual(self.offline("check").stdout, "0 faults\n")
+        self.assertEqual(self.offline("check").stdout.splitlines(), ["models: 1, meshes: 0, jobs: 0", "0 faults"])
         self.flip_a_bit()
         self.daemon.start()
         self.run_command("model", "import", copy, "--label", "copy")
@@ -158,13 +158,26 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertEqual(checked.returncode, 1)
         self.assertIn("has changed on the disk", checked.stdout)
         repaired = self.offline("repair")
-        self.assertEqual((repaired.returncode, self.offline("check").stdout), (0, "0 faults\n"),
-                         repaired)
+        self.assertEqual(repaired.returncode, 1)
+        self.assertRegex(repaired.stdout, r"left out of models: \w+: .*\n.*models: 1, meshes: 0, jobs: 0\n"
+                                          r".*carillon.db.damaged\n1 fault\n")
+        self.assertIn("0 faults", self.offline("check").stdout)
         self.assertTrue((self.folder / "data/carillon.db.damaged").exists())
         self.daemon.start()
         listed = self.run_command("model", "list")
         self.assertIn("copy", listed)
         self.assertNotIn("bar", listed)
+
+    def test_a_folder_without_a_database_is_told_and_nothing_is_made_in_it(self):
+        other = self.folder / "other"
+        other.mkdir()
+        for folder in (other, self.folder / "nowhere"):
+            for command in ("check", "repair"):
+                refused = self.offline(command, folder=folder)
+                self.assertEqual(refused.returncode, 1)
+                self.assertIn("FILE_NOT_FOUND: there is no database carillon.db in ", refused.stderr)
+        self.assertEqual(list(other.iterdir()), [])
+        self.assertFalse((self.folder / "nowhere").exists())
 
     def test_a_damaged_backup_is_refused_and_nothing_is_changed(self):
         backup = self.folder / "backup.db"

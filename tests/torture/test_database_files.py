@@ -6,6 +6,7 @@ import contextlib
 import os
 import pathlib
 import shutil
+import subprocess
 import tempfile
 import unittest
 
@@ -18,9 +19,9 @@ from carillon.v1 import modal_model_service_pb2
 from daemon import Daemon
 
 MODELS = "carillon.v1.ModalModelService"
-# The data folder of a daemon in a mount namespace of its own is a disk of 96 MiB.
+# Makes a disk of 96 MiB over a folder, in a mount namespace of its own, which lasts as long as this process.
 SMALL_DISK = ("unshare", "--user", "--map-root-user", "--mount", "sh", "-euc",
-              'mount -t tmpfs -o size=96m tmpfs "$0"; exec "$@"')
+              'mount -t tmpfs -o size=96m tmpfs "$0"; echo; exec cat')
 
 
 class DatabaseFilesTest(unittest.TestCase):
@@ -30,14 +31,21 @@ class DatabaseFilesTest(unittest.TestCase):
         cls.addClassCleanup(scratch.cleanup)
         cls.records = scripted.read_records(scripted.make_model(scratch.name))
 
-    def serve(self, disk=()):
+    def small_disk(self):
+        """Makes the data folder a small disk. Returns the words with which a program begins that sees it."""
+        keeper = subprocess.Popen([*SMALL_DISK, self.folder / "data"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.addCleanup(keeper.communicate)
+        keeper.stdout.readline()
+        return ("nsenter", "--target", str(keeper.pid), "--user", "--mount", "--preserve-credentials")
+
+    def serve(self, on_small_disk=False):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
         (self.folder / "data").mkdir()
         self.file = self.folder / "data/carillon.db"
         self.log = self.folder / "data/carillon.db-wal"
-        self.daemon = Daemon(self.folder, prefix=(*disk, self.folder / "data") if disk else ())
+        self.daemon = Daemon(self.folder, prefix=self.small_disk() if on_small_disk else ())
         self.addCleanup(self.daemon.kill)
         self.client = self.daemon.client()
 
@@ -108,14 +116,20 @@ class DatabaseFilesTest(unittest.TestCase):
         return count
 
     def test_models_can_be_deleted_from_a_full_disk_and_it_takes_new_ones_again(self):
-        self.serve(SMALL_DISK)
+        self.serve(on_small_disk=True)
         count = self.fill_the_disk()
-        self.assertRegex(self.store(count), "^DATABASE_(FULL|IO_ERROR)$")
+        self.assertEqual(self.store(count), "DATABASE_FULL")
+        torture.wait_until(lambda: self.daemon.health(MODELS) == "NOT_SERVING", 30)
+        self.assertTrue(self.said("DATABASE_FULL: "))
+        self.assertEqual(self.daemon.health(), "SERVING")
+        self.restart_after_a_kill()
+        self.assertEqual(self.store(count), "DATABASE_FULL")
         for number in range(count):
             self.client.models.DeleteModalModel(
                 modal_model_service_pb2.DeleteModalModelRequest(name=f"modalModels/{number:064x}"))
         self.assertEqual(self.stored_count(), 0)
         self.assertEqual(self.store(0), "")
+        torture.wait_until(lambda: self.daemon.health(MODELS) == "SERVING", 30)
         print(f"{count} of {count} models were deleted from a full disk", flush=True)
 
 

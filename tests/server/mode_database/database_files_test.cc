@@ -143,6 +143,16 @@ TEST_F(DatabaseFilesTest, ARepairKeepsMeshesAndModels) {
   EXPECT_TRUE(database_->meshes().WriteFile(digest, folder_ / "mesh").ok());
 }
 
+TEST_F(DatabaseFilesTest, ADeletionWritesLittleIntoTheLog) {
+  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
+  ASSERT_TRUE(Put("large").ok());
+  const auto size = std::filesystem::file_size(file_);
+  EXPECT_GT(size, 12U << 20U);
+  Open();  // the log is gone
+  ASSERT_TRUE(database_->models().Delete(Sha256Hex("large")).ok());
+  EXPECT_LT(std::filesystem::file_size(log_), size / 8);
+}
+
 TEST_F(DatabaseFilesTest, ACollectionDeletesMoreThanOneTransactionDoes) {
   for (int i = 0; i < 40; ++i) {
     ASSERT_TRUE(Put(std::to_string(i)).ok());

@@ -12,9 +12,11 @@
 #include <thread>
 #include <vector>
 
+#include "proto/cpp/error_reason.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
+#include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -22,6 +24,7 @@
 namespace carillon {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class HeldDatabaseTest : public ::testing::Test {
@@ -56,6 +59,22 @@ TEST_F(HeldDatabaseTest, ChangesThatWaitTogetherGiveUpTogether) {
     EXPECT_THAT(change.get().ToString(), HasSubstr("DATABASE_BUSY: "));
   }
   EXPECT_TRUE(Put("a").ok());
+}
+
+TEST_F(HeldDatabaseTest, TheKeeperTellsUntilTheDatabaseCanBeChangedAgain) {
+  std::vector<std::string> told;
+  DatabaseKeeper keeper(database_->database(), [&told](const absl::Status& state) {
+    told.push_back(state.ok() ? "OK" : ToErrorInfo(state).reason());
+  });
+  keeper.Look();
+  EXPECT_FALSE(Put("a").ok());
+  for (int i = 0; i < 3; ++i) keeper.Look();
+  EXPECT_THAT(told, ElementsAre("OK", "DATABASE_BUSY"));
+  EXPECT_FALSE(database_->database().CheckState().ok());
+  ASSERT_TRUE(other_->Run("ROLLBACK").ok());
+  for (int i = 0; i < 3; ++i) keeper.Look();
+  EXPECT_THAT(told, ElementsAre("OK", "DATABASE_BUSY", "OK"));
+  EXPECT_TRUE(database_->database().CheckState().ok());
 }
 
 TEST_F(HeldDatabaseTest, ModelsAreFoundWhileACollectionWaits) {
