@@ -84,7 +84,7 @@ void LogMissingChanges(const Database& database) {
   }
 }
 
-/// Logs the stored changes that are missing. Removes unused meshes, and models beyond the budget.
+/// Sets the budget of models, logs the stored changes that are missing, and removes unused meshes.
 void Tidy(ModeDatabase& database, const Options& options) {
   database.models().KeepWithin(
       {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});

@@ -6,11 +6,13 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_contents.h"
+#include "server/mode_database/database_files.h"
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/model_sql.h"
 #include "server/mode_database/sqlite_connection.h"
@@ -147,6 +149,26 @@ absl::Status BackUp(Database& database, const std::filesystem::path& copy,
   RETURN_IF_ERROR(database.Read(
       [&](SqliteConnection& connection) { return connection.BackUpTo(copy, goes_on); }));
   return SqliteConnection::CheckStructure(copy, goes_on);
+}
+
+absl::Status CheckAfterLoss(Database& database) {
+  const LossMark mark(database.file());
+  if (!mark.IsSet()) return absl::OkStatus();
+  std::string fault;
+  RETURN_IF_ERROR(database.Read([&](SqliteConnection& connection) {
+    return connection.Query("PRAGMA quick_check(1)", {}, [&](const SqlRow& row) {
+      fault = row.Text(0);
+      return absl::OkStatus();
+    });
+  }));
+  if (fault == "ok") {
+    mark.Remove();
+    return absl::OkStatus();
+  }
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                 absl::StrCat("somebody changed the files of ", database.file().string(),
+                              " while the last daemon ran, and damaged the database (", fault,
+                              "): run carillond db repair or carillond db restore"));
 }
 
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {

@@ -36,13 +36,17 @@ absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 absl::Status BackUp(Database& database, const std::filesystem::path& copy,
                     absl::FunctionRef<bool()> goes_on);
 
+/// Checks the structure of a database that was lost when it was open last (LossMark). Errors:
+/// DataLoss (DATABASE_CORRUPT).
+absl::Status CheckAfterLoss(Database& database);
+
 /// Takes the faults that a check finds, one line for each.
 using OnFinding = std::function<void(const std::string& line)>;
 
 /// The functions below work on a file that no daemon has open.
 
 /// Checks SQLite's structure, every hash of every model, the digest of every mesh and every job.
-/// Writes nothing. Errors: those of ModeDatabase::Open, and DataLoss (DATABASE_CORRUPT) if the
+/// Writes nothing but the newest schema. Errors: those of ModeDatabase::Open, and DataLoss (DATABASE_CORRUPT) if the
 /// structure cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 

@@ -8,9 +8,11 @@
 #include <array>
 #include <atomic>
 #include <charconv>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -53,8 +55,9 @@ absl::Status DatabaseFiles::Check() {
   const MutexLock lock(&mutex_);
   const bool has_database = IsWhole(file_, database_, sizes_.database());
   const bool has_log = IsWhole(LogOf(file_), log_, sizes_.log());
-  lost_ = lost_ || !has_database || !has_log;
+  const bool was_lost = std::exchange(lost_, lost_ || !has_database || !has_log);
   if (!lost_) return absl::OkStatus();
+  if (!was_lost) LossMark(file_).Set();
   // The stop would copy a damaged log into the file.
   sizes_.database().Close();
   sizes_.log().Close();
@@ -70,6 +73,20 @@ absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
   absl::Status worked = work();
   RETURN_IF_ERROR(Check());
   return worked;
+}
+
+LossMark::LossMark(const std::filesystem::path& file) : file_(file.string() + "-lost") {}
+
+void LossMark::Set() const { std::ofstream{file_}; }
+
+bool LossMark::IsSet() const {
+  std::error_code error;
+  return std::filesystem::exists(file_, error);
+}
+
+void LossMark::Remove() const {
+  std::error_code ignored;
+  std::filesystem::remove(file_, ignored);
 }
 
 ChangeCount::ChangeCount(const std::filesystem::path& file)

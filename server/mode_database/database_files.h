@@ -27,7 +27,7 @@ class DatabaseFiles {
   const std::string& vfs_name() const { return sizes_.vfs_name(); }
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than SQLite has made it). Once a function of this object has returned
+  /// or is smaller than SQLite has made it, or the -shm file was truncated). Once a function of this object has returned
   /// DATABASE_LOST, all later calls return it. The first call remembers which files they are, and
   /// must follow the first write.
   absl::Status Check();
@@ -53,6 +53,22 @@ class DatabaseFiles {
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+/// An empty file beside a database that was lost while the daemon ran. The structure of such a
+/// database must be checked before it is used again.
+class LossMark {
+ public:
+  /// `file` is the database file.
+  explicit LossMark(const std::filesystem::path& file);
+
+  /// A mark that cannot be set is not there at the next start.
+  void Set() const;
+  bool IsSet() const;
+  void Remove() const;
+
+ private:
+  const std::filesystem::path file_;
 };
 
 /// The number of committed changes, in a file beside the database. A database with fewer changes

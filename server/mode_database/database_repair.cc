@@ -164,9 +164,10 @@ absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::pat
   std::error_code error;
   const std::filesystem::path incoming = file.string() + ".incoming";
   Remove(incoming);
-  if (!std::filesystem::exists(copy)) {
+  if (!std::filesystem::exists(copy, error)) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat("there is no file ", copy.string(), ": name a backup"));
+                   absl::StrCat("there is no file ", copy.string(),
+                                ", or this user may not see it: name a backup"));
   }
   std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
   std::filesystem::copy_file(copy, incoming, error);

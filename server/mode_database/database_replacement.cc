@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/mode_database/database_files.h"
 
 namespace carillon {
 namespace {
@@ -102,6 +103,7 @@ absl::Status CompleteReplacement(const path& file) {
     RETURN_IF_ERROR(Rename(fresh_count, file.string() + "-count"));
   }
   RETURN_IF_ERROR(Sync(file.parent_path()));
+  LossMark(file).Remove();
   std::filesystem::remove(MarkerOf(file), ignored);
   return absl::OkStatus();
 }

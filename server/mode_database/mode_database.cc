@@ -5,12 +5,15 @@
 
 #include "proto/cpp/status_macros.h"
 #include "server/mode_database/database.h"
+#include "server/mode_database/database_admin.h"
+#include "server/mode_database/database_files.h"
 
 namespace carillon {
 
 absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::filesystem::path& file,
                                                                  const Clock& clock) {
   ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(file));
+  RETURN_IF_ERROR(CheckAfterLoss(*database));
   RemoveUnfinishedBackups(database->file());
   return std::unique_ptr<ModeDatabase>(new ModeDatabase(std::move(database), clock));
 }

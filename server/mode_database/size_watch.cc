@@ -20,6 +20,7 @@ std::string NewName() {
 struct WatchedFile {
   sqlite3_file base;
   WrittenSize* size;
+  MappingGuard* index;
 };
 
 sqlite3_file& Real(sqlite3_file* file) {
@@ -43,6 +44,23 @@ int Truncate(sqlite3_file* file, sqlite3_int64 size) {
   return SizeOf(file).Truncate(Real(file), size);
 }
 
+MappingGuard& IndexOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->index; }
+
+int MapIndex(sqlite3_file* file, int region, int size, int extend, volatile void** mapped) {
+  sqlite3_file& real = Real(file);
+  const int result = real.pMethods->xShmMap(&real, region, size, extend, mapped);
+  if (result == SQLITE_OK && *mapped != nullptr) {
+    IndexOf(file).Guard(*mapped, static_cast<size_t>(size));
+  }
+  return result;
+}
+
+int UnmapIndex(sqlite3_file* file, int remove) {
+  IndexOf(file).Release();
+  sqlite3_file& real = Real(file);
+  return real.pMethods->xShmUnmap(&real, remove);
+}
+
 using Io = sqlite3_io_methods;
 const Io kWatched = {.iVersion = 3,
                      .xClose = Forward<&Io::xClose>,
@@ -57,10 +75,10 @@ const Io kWatched = {.iVersion = 3,
                      .xFileControl = Forward<&Io::xFileControl>,
                      .xSectorSize = Forward<&Io::xSectorSize>,
                      .xDeviceCharacteristics = Forward<&Io::xDeviceCharacteristics>,
-                     .xShmMap = Forward<&Io::xShmMap>,
+                     .xShmMap = MapIndex,
                      .xShmLock = Forward<&Io::xShmLock>,
                      .xShmBarrier = Forward<&Io::xShmBarrier>,
-                     .xShmUnmap = Forward<&Io::xShmUnmap>,
+                     .xShmUnmap = UnmapIndex,
                      .xFetch = Forward<&Io::xFetch>,
                      .xUnfetch = Forward<&Io::xUnfetch>};
 
@@ -81,7 +99,7 @@ void WrittenSize::Open(int64_t byte_count) {
 
 bool WrittenSize::IsWhole(absl::FunctionRef<int64_t()> look) {
   const MutexLock lock(&mutex_);
-  lost_ = lost_ || look() < byte_count_;
+  lost_ = lost_ || index_.was_truncated() || look() < byte_count_;
   return !lost_;
 }
 
@@ -102,7 +120,7 @@ int WrittenSize::Write(sqlite3_file& file, const void* data, int size, int64_t o
 int WrittenSize::Truncate(sqlite3_file& file, int64_t byte_count) {
   // Under the lock, IsWhole sees the new size of the file together with the new count.
   const MutexLock lock(&mutex_);
-  if (lost_) return SQLITE_IOERR_TRUNCATE;
+  if (lost_ || index_.was_truncated()) return SQLITE_IOERR_TRUNCATE;
   byte_count_ = std::min(byte_count_, byte_count);
   return file.pMethods->xTruncate(&file, byte_count);
 }
@@ -114,7 +132,7 @@ int64_t WrittenSize::byte_count() const {
 
 struct SizeWatch::Layer {
   explicit Layer(SizeWatch& watch)
-      : real(*sqlite3_vfs_find(nullptr)), vfs(real), database(watch.database_), log(watch.log_) {
+      : real(*sqlite3_vfs_find(nullptr)), vfs(real), database(watch.database_), log(watch.log_), index(watch.index_) {
     vfs.zName = watch.name_.c_str();
     vfs.pAppData = this;
     vfs.szOsFile += static_cast<int>(sizeof(WatchedFile));
@@ -138,6 +156,7 @@ struct SizeWatch::Layer {
     WrittenSize& size = is_database ? layer.database : layer.log;
     file->pMethods = &kWatched;
     reinterpret_cast<WatchedFile*>(file)->size = &size;
+    reinterpret_cast<WatchedFile*>(file)->index = &layer.index;
     if (result == SQLITE_OK) size.Open(SizeNow(real));
     return result;
   }
@@ -146,6 +165,7 @@ struct SizeWatch::Layer {
   sqlite3_vfs vfs;
   WrittenSize& database;
   WrittenSize& log;
+  MappingGuard& index;
 };
 
 SizeWatch::SizeWatch() : name_(NewName()), layer_(std::make_unique<Layer>(*this)) {}

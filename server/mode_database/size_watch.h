@@ -8,6 +8,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "server/base/mutex.h"
+#include "server/mode_database/mapping_guard.h"
 
 struct sqlite3_file;
 
@@ -17,6 +18,10 @@ namespace carillon {
 /// every thread.
 class WrittenSize {
  public:
+  /// `index` guards the mapping of the log's index. Once that was truncated, no file is whole,
+  /// because SQLite no longer knows what is in the log.
+  explicit WrittenSize(const MappingGuard& index) : index_(index) {}
+
   /// Notes that SQLite has opened a file of `byte_count` bytes.
   void Open(int64_t byte_count);
 
@@ -36,6 +41,7 @@ class WrittenSize {
   int64_t byte_count() const;
 
  private:
+  const MappingGuard& index_;
   mutable Mutex mutex_;
   int64_t byte_count_ ABSL_GUARDED_BY(mutex_) = 0;
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
@@ -43,7 +49,8 @@ class WrittenSize {
 
 /// A layer between SQLite and the operating system (a VFS) that knows how large SQLite has made a
 /// database file and its write-ahead log. It looks at a file's size before each write, because a
-/// write beyond the end of a truncated file makes the file as large as it was.
+/// write beyond the end of a truncated file makes the file as large as it was. It also guards the
+/// mapping of the log's index (the -shm file).
 class SizeWatch {
  public:
   /// Adds the layer to SQLite under a new name.
@@ -64,8 +71,9 @@ class SizeWatch {
  private:
   struct Layer;
   const std::string name_;
-  WrittenSize database_;
-  WrittenSize log_;
+  MappingGuard index_;
+  WrittenSize database_{index_};
+  WrittenSize log_{index_};
   std::unique_ptr<Layer> layer_;
 };
 

@@ -116,6 +116,37 @@ TEST_F(DatabaseFilesTest, ALogThatIsTruncatedAmidAChangeIsLost) {
   });
 }
 
+TEST_F(DatabaseFilesTest, ADatabaseThatWasLostAndDamagedDoesNotOpen) {
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
+  Open();  // the log has gone into the file
+  ASSERT_TRUE(Put("in the log").ok());
+  constexpr size_t kPage = 65536;
+  const uintmax_t size = std::filesystem::file_size(file_);
+  std::fstream(file_, std::ios::in | std::ios::out | std::ios::binary)
+      .seekp(static_cast<std::streamoff>(size - 8 * kPage))
+      .write(std::string(4 * kPage, '\0').data(), 4 * kPage);
+  ExpectLost([&] { std::filesystem::resize_file(log_, 0); });
+  database_.reset();
+  EXPECT_THAT(ModeDatabase::Open(file_, clock_).status().ToString(), HasSubstr("DATABASE_CORRUPT: "));
+  EXPECT_EQ(RepairDatabase(file_, [](const std::string&) {}).status(), absl::OkStatus());
+  Open();
+  EXPECT_TRUE(Has("kept"));
+}
+
+TEST_F(DatabaseFilesTest, AnIndexOfTheLogThatIsTruncatedIsLostAndKillsNobody) {
+  for (const uintmax_t size : {0, 4096}) {
+    Open();
+    ASSERT_TRUE(Put("acknowledged").ok());
+    ExpectLost([&] { std::filesystem::resize_file(folder_ / "carillon.db-shm", size); });
+    database_.reset();
+    Open();
+    EXPECT_TRUE(Has("kept"));
+    EXPECT_TRUE(Has("acknowledged"));
+    EXPECT_FALSE(Has("new"));
+    ASSERT_TRUE(database_->models().Delete(Sha256Hex("acknowledged")).ok());
+  }
+}
+
 TEST_F(DatabaseFilesTest, ALostDatabaseIsNotWrittenAtTheEnd) {
   Open();  // the log has gone into the file
   const std::string whole = ReadBytes(file_);
