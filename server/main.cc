@@ -332,9 +332,9 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
     return Conclude(finding_count,
                     "the faults above were found: `carillond db repair` keeps all undamaged rows");
   }
-  ASSIGN_OR_RETURN(const std::filesystem::path kept,
-                   restores ? RestoreDatabase(file, command.backup_file)
-                            : RepairDatabase(file, on_finding));
+  ASSIGN_OR_RETURN(
+      const std::filesystem::path kept,
+      restores ? RestoreDatabase(file, command.backup_file) : RepairDatabase(file, on_finding));
   RETURN_IF_ERROR(Report(file, kept));
   if (restores) return absl::OkStatus();
   return Conclude(finding_count, "what the lines above name is lost; all else was kept");

@@ -182,8 +182,8 @@ struct ApiServer::State {
   /// impossible.
   void ShowWorkers(bool can);
 
-  /// Sets the health of ModalModelService and DecompositionService, and logs why the database cannot
-  /// be changed, or that it can be changed again.
+  /// Sets the health of ModalModelService and DecompositionService, and logs why the database
+  /// cannot be changed, or that it can be changed again.
   void ShowDatabase(const absl::Status& state);
 
   const Clock& clock;

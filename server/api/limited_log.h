@@ -35,8 +35,9 @@ class Allowance {
 };
 
 /// A log that untrusted clients cannot flood. It takes twenty lines at once, then one a second.
-/// Further lines are dropped, and their count and subject are logged before the next line. Bytes that are not
-/// printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every thread.
+/// Further lines are dropped, and their count and subject are logged before the next line. Bytes
+/// that are not printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every
+/// thread.
 class LimitedLog {
  public:
   using Sink = std::function<void(const std::string&)>;

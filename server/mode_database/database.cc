@@ -27,9 +27,9 @@ constexpr size_t kMostIdleReaders = 4;
 // Only the writer sets auto_vacuum, with which a new file can shrink: on an existing file this
 // pragma is a write, and a reader would wait for the writer. Changes go from the log into the file
 // whenever the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a
-// crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again. Debian's
-// SQLite overwrites what is deleted with zeros, for which a full disk has no space in the log; with
-// secure_delete = FAST a deletion writes no page for that alone.
+// crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again.
+// Debian's SQLite overwrites what is deleted with zeros, for which a full disk has no space in the
+// log; with secure_delete = FAST a deletion writes no page for that alone.
 constexpr char kWriter[] =
     "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64; "
     "PRAGMA journal_size_limit = 16777216; PRAGMA secure_delete = FAST;";
@@ -71,8 +71,9 @@ bool EmptyLog(SqliteConnection& writer) {
 /// SQLite holds locks of its own for moments.
 constexpr std::chrono::milliseconds kMoment{50};
 
-/// Lets the writer wait for other processes for what is left of the longest wait since `asked`. The
-/// changes that queue up while another process holds the database thus all fail at the same time.
+/// Lets the writer wait for other processes for the rest of the longest wait, which began at
+/// `asked`. The changes that queue up while another process holds the database thus all fail at the
+/// same time.
 void LimitWait(SqliteConnection& writer, std::chrono::steady_clock::time_point asked) {
   const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(
       std::chrono::steady_clock::now() - asked);

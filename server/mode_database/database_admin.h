@@ -46,8 +46,8 @@ using OnFinding = std::function<void(const std::string& line)>;
 /// The functions below work on a file that no daemon has open.
 
 /// Checks SQLite's structure, every hash of every model, the digest of every mesh and every job.
-/// Writes nothing but the newest schema. Errors: those of ModeDatabase::Open, and DataLoss (DATABASE_CORRUPT) if the
-/// structure cannot be read.
+/// Writes nothing but the newest schema. Errors: those of ModeDatabase::Open, and DataLoss
+/// (DATABASE_CORRUPT) if the structure cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
 /// Copies every undamaged model, mesh and job into a new database, which replaces the old one.
@@ -58,8 +58,8 @@ absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path
                                                      const OnFinding& on_finding);
 
 /// Replaces the database by a copy that BackUp made, after a check of the copy. Returns the name
-/// under which the old database is kept, `file`.replaced or `file`.replaced-2 and so on, or an empty
-/// path if there was none. Errors: NotFound (FILE_NOT_FOUND), DataLoss (DATABASE_CORRUPT),
+/// under which the old database is kept, `file`.replaced or `file`.replaced-2 and so on, or an
+/// empty path if there was none. Errors: NotFound (FILE_NOT_FOUND), DataLoss (DATABASE_CORRUPT),
 /// FailedPrecondition (SCHEMA_TOO_NEW).
 absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::path& file,
                                                       const std::filesystem::path& copy);

@@ -27,9 +27,9 @@ class DatabaseFiles {
   const std::string& vfs_name() const { return sizes_.vfs_name(); }
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than SQLite has made it, or the -shm file was truncated). Once a function of this object has returned
-  /// DATABASE_LOST, all later calls return it. The first call remembers which files they are, and
-  /// must follow the first write.
+  /// or is smaller than SQLite has made it, or the -shm file was truncated). Once a function of
+  /// this object has returned DATABASE_LOST, all later calls return it. The first call remembers
+  /// which files they are, and must follow the first write.
   absl::Status Check();
 
   /// Checks both files, runs `work`, which may change them, and checks them again. Each write of

@@ -120,8 +120,8 @@ absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding
   return absl::OkStatus();
 }
 
-/// Appends zeros to a file that somebody has cut short, because SQLite reads nothing of such a file.
-/// The pages that are lost are then found damaged, and all others are kept.
+/// Appends zeros to a file that somebody has cut short, because SQLite reads nothing of such a
+/// file. The pages that are lost are then found damaged, and all others are kept.
 absl::Status ExtendCutFile(const std::filesystem::path& file) {
   const auto number = [](std::span<const unsigned char> bytes) {
     uint64_t value = 0;

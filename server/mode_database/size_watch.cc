@@ -132,7 +132,11 @@ int64_t WrittenSize::byte_count() const {
 
 struct SizeWatch::Layer {
   explicit Layer(SizeWatch& watch)
-      : real(*sqlite3_vfs_find(nullptr)), vfs(real), database(watch.database_), log(watch.log_), index(watch.index_) {
+      : real(*sqlite3_vfs_find(nullptr)),
+        vfs(real),
+        database(watch.database_),
+        log(watch.log_),
+        index(watch.index_) {
     vfs.zName = watch.name_.c_str();
     vfs.pAppData = this;
     vfs.szOsFile += static_cast<int>(sizeof(WatchedFile));

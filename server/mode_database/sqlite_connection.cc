@@ -40,9 +40,9 @@ std::string UriOf(const std::filesystem::path& file) {
 }
 
 absl::Status Full(absl::string_view what) {
-  return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
-                 absl::StrCat("no space is left for the database (", what,
-                              "): free some, or delete models"));
+  return Refusal(
+      absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+      absl::StrCat("no space is left for the database (", what, "): free some, or delete models"));
 }
 
 absl::Status ToStatus(const SQLite::Exception& error) {

@@ -127,7 +127,8 @@ TEST_F(DatabaseFilesTest, ADatabaseThatWasLostAndDamagedDoesNotOpen) {
       .write(std::string(4 * kPage, '\0').data(), 4 * kPage);
   ExpectLost([&] { std::filesystem::resize_file(log_, 0); });
   database_.reset();
-  EXPECT_THAT(ModeDatabase::Open(file_, clock_).status().ToString(), HasSubstr("DATABASE_CORRUPT: "));
+  EXPECT_THAT(ModeDatabase::Open(file_, clock_).status().ToString(),
+              HasSubstr("DATABASE_CORRUPT: "));
   EXPECT_EQ(RepairDatabase(file_, [](const std::string&) {}).status(), absl::OkStatus());
   Open();
   EXPECT_TRUE(Has("kept"));

@@ -23,10 +23,10 @@
 namespace carillon {
 namespace {
 
+using std::filesystem::path;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using std::filesystem::path;
 
 class DatabaseReplacementTest : public ::testing::Test {
  protected:
@@ -37,8 +37,7 @@ class DatabaseReplacementTest : public ::testing::Test {
   /// Stores a model of this name in a database.
   void Put(const path& file, const std::string& name) {
     const auto database = *ModeDatabase::Open(file, clock_);
-    EXPECT_TRUE(
-        database->models().PutFile(Sha256Hex(name), name, folder_ / "model").status().ok());
+    EXPECT_TRUE(database->models().PutFile(Sha256Hex(name), name, folder_ / "model").status().ok());
   }
 
   std::vector<std::string> Labels(const path& file) {
@@ -74,13 +73,10 @@ TEST_F(DatabaseReplacementTest, EveryDatabaseThatWasReplacedIsKept) {
 TEST_F(DatabaseReplacementTest, WhatAKilledProgramHasBegunIsCompletedAtTheNextStart) {
   // What the program had done when it was killed, after the marker had been written.
   const std::vector<std::function<void()>> steps = {
-      [] {},
-      [this] { std::filesystem::create_hard_link(file_, folder_ / "carillon.db.replaced"); },
+      [] {}, [this] { std::filesystem::create_hard_link(file_, folder_ / "carillon.db.replaced"); },
       [this] { std::filesystem::remove(folder_ / "carillon.db-wal"); },
       [this] { std::filesystem::rename(folder_ / "fresh", file_); },
-      [this] {
-        std::filesystem::rename(folder_ / "fresh-count", folder_ / "carillon.db-count");
-      }};
+      [this] { std::filesystem::rename(folder_ / "fresh-count", folder_ / "carillon.db-count"); }};
   for (size_t count = 1; count <= steps.size(); ++count) {
     for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
       if (entry.path().filename() != "model") std::filesystem::remove(entry.path());

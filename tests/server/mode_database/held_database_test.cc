@@ -78,7 +78,8 @@ TEST_F(HeldDatabaseTest, TheKeeperTellsUntilTheDatabaseCanBeChangedAgain) {
 }
 
 TEST_F(HeldDatabaseTest, ModelsAreFoundWhileACollectionWaits) {
-  auto collected = std::async(std::launch::async, [this] { return database_->models().Collect(0); });
+  auto collected =
+      std::async(std::launch::async, [this] { return database_->models().Collect(0); });
   // The collection has begun to wait, which it does for 10 s.
   std::this_thread::sleep_for(std::chrono::seconds(1));
   EXPECT_TRUE(database_->models().FindToSound(Sha256Hex("kept")).ok());
