@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 #include "server/api/access_table.h"
 #include "server/api/guess_limiter.h"
-#include "server/api/limited_log.h"
+#include "server/base/limited_log.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
 

@@ -30,7 +30,6 @@
 #include "server/api/grpc_servers.h"
 #include "server/api/idle_calls.h"
 #include "server/api/job_run_service.h"
-#include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
 #include "server/api/scene_leases.h"
@@ -40,6 +39,7 @@
 #include "server/api/thread_pool.h"
 #include "server/api/timetable.h"
 #include "server/api/tls_credentials.h"
+#include "server/base/limited_log.h"
 #include "server/mode_database/database_keeper.h"
 
 namespace carillon {

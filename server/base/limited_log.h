@@ -35,11 +35,15 @@ class Allowance {
 };
 
 /// A log that untrusted clients cannot flood. It takes twenty lines at once, then one a second.
-/// Further lines are dropped, and their count and subject are logged before the next line. Bytes that are not
-/// printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every thread.
+/// Further lines are dropped, and their count and subject are logged before the next line. Bytes
+/// that are not printable ASCII are escaped, and lines are cut at 400 bytes. Safe from every
+/// thread.
 class LimitedLog {
  public:
   using Sink = std::function<void(const std::string&)>;
+
+  /// Number of lines that are taken at once.
+  static constexpr double kMostAtOnce = 20;
 
   /// `subject` tells what the lines are about. `clock` must outlive the log.
   LimitedLog(const Clock& clock, std::string subject, Sink sink)
@@ -59,7 +63,7 @@ class LimitedLog {
   const std::string subject_;
   const Sink sink_;
   Mutex mutex_;
-  Allowance lines_ ABSL_GUARDED_BY(mutex_){20};
+  Allowance lines_ ABSL_GUARDED_BY(mutex_){kMostAtOnce};
   uint64_t left_out_count_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/limited_log.h"
+#include "server/base/limited_log.h"
 
 #include <algorithm>
 
