@@ -5,6 +5,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 
 namespace carillon {
@@ -26,7 +27,9 @@ bool IsPlain(absl::string_view value) {
 }
 
 std::string InLine(const std::string& value) {
-  return IsPlain(value) ? value : absl::StrCat("\"", absl::CHexEscape(value), "\"");
+  if (IsPlain(value)) return value;
+  // Within double quotes a single quote needs no escape.
+  return absl::StrCat("\"", absl::StrReplaceAll(absl::CHexEscape(value), {{"\\'", "'"}}), "\"");
 }
 
 }  // namespace
