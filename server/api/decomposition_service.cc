@@ -172,8 +172,10 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
         ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
         ASSIGN_OR_RETURN(const v1::Job before, queue_.Get(digest));
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
-        // A job that has ended stays as it is.
-        if (HasEnded(before)) return absl::OkStatus();
+        // A job that has ended stays as it is, also if it ended between the two calls.
+        const v1::JobState state = response->job().state();
+        const bool ended = state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED;
+        if (HasEnded(before) || ended) return absl::OkStatus();
         writing_.events.LogCancelled(
             Event("job_cancelled").With("job", before.name()).WithSome("label", before.label()),
             caller);
