@@ -116,7 +116,8 @@ class AccessTest(unittest.TestCase):
     def logged(self, pattern):
         """How many lines of the log match, with those that were counted instead."""
         log = (self.folder / "log").read_text()
-        return len(re.findall(pattern, log)) + sum(map(int, re.findall(r"(\d+) more lines about refused access", log)))
+        counted = re.findall(r"(\d+) more lines about (?:refused access|gRPC)", log)
+        return len(re.findall(pattern, log)) + sum(map(int, counted))
 
     def test_every_method_needs_the_role_that_the_page_names(self):
         self.serve()
