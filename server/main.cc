@@ -2,7 +2,6 @@
 //
 // carillond: puts the rooms of the daemon together.
 
-#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
@@ -25,6 +24,7 @@
 #include "server/api/api_server.h"
 #include "server/api/client_limits.h"
 #include "server/base/clock.h"
+#include "server/daemon_log.h"
 #include "server/daemon_metrics.h"
 #include "server/data_directory.h"
 #include "server/decomposition/decomposition_queue.h"
@@ -50,13 +50,6 @@ constexpr char kVersion[] = CARILLON_VERSION;
 
 /// Reads the command line and the configuration file once more.
 using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
-
-/// Logs go to stderr, one line a message; stdout is left to output that programs read.
-void SetUpLog() {
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("carillond"));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l: %v");
-  spdlog::flush_on(spdlog::level::info);
-}
 
 void AnnounceReady(const ApiServer& server) {
   for (const std::string& address : server.addresses()) {
@@ -86,8 +79,9 @@ void LogMissingChanges(const Database& database) {
 
 /// Sets the budget of models, logs the stored changes that are missing, and removes unused meshes.
 void Tidy(ModeDatabase& database, const Options& options) {
-  database.models().KeepWithin(
-      {.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U, .log = LogWarning});
+  database.models().KeepWithin({.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U,
+                                .log = LogWarning,
+                                .log_event = LogEvent});
   LogMissingChanges(database.database());
   CollectUnusedMeshes(database);
 }
@@ -150,7 +144,8 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
        .max_queued_count_of_client =
            ClientLimits::ShareOf(static_cast<size_t>(options.queue_limit), options.client_share),
        .transfers = options.transfers,
-       .log = LogWarning});
+       .log = LogWarning,
+       .log_event = LogEvent});
 }
 
 OutputSettings OutputSettingsOf(const Options& options) {
@@ -174,6 +169,7 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .version = kVersion,
           .scene_grace_s = options.scene_grace_s,
           .client_share = options.client_share,
+          .precompute_program = options.precompute_program,
           .slurm = options.executor == "slurm"};
 }
 
@@ -184,6 +180,7 @@ Options WithReloadable(Options present, const Options& read) {
         &Options::access_file}) {
     if ((present.*file).empty() == (read.*file).empty()) present.*file = read.*file;
   }
+  present.log_level = read.log_level;
   return present;
 }
 
@@ -200,10 +197,11 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   if (status.ok()) {
     if (!(changed == read->options)) {
       spdlog::warn(
-          "some changed settings need a restart: a reload takes only the access file and the TLS "
-          "files into account, and does not begin or end the use of one");
+          "some changed settings need a restart: a reload takes only the log level, the access "
+          "file and the TLS files into account, and does not begin or end the use of a file");
     }
     options = changed;
+    SetLogLevel(options.log_level);
     spdlog::info("the configuration, the access file and the TLS files were read again");
   } else {
     spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));
@@ -270,6 +268,7 @@ absl::Status Run(Options options, const ReadOptions& read_options) {
                                                              .clock = clock,
                                                              .log = LogWarning,
                                                              .log_error = LogError,
+                                                             .log_event = LogEvent,
                                                              .can_decompose = [options] {
                                                                return CanDecompose(options);
                                                              }}));
@@ -355,6 +354,7 @@ int Main(int argc, const char* const* argv) {
     std::cout << "the configuration is valid" << std::endl;
     return EXIT_SUCCESS;
   }
+  if (command.ok()) SetLogLevel(command->options.log_level);
   const absl::Status status = !command.ok() ? command.status()
                               : command->database_command.empty()
                                   ? Run(command->options, read_options)

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
@@ -85,6 +86,7 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("scene_grace", options.scene_grace_s);
   visit("client_share", options.client_share);
   visit("metrics", options.metrics_address);
+  visit("log_level", options.log_level);
   visit("workers", options.worker_count);
   visit("memory_budget_mib", options.memory_budget_mib);
   visit("job_memory_mib", options.job_memory_mib);
@@ -151,6 +153,7 @@ absl::Status ReadFile(const std::string& path, Options& options) {
   return absl::OkStatus();
 }
 
+constexpr const char* kLogLevels[] = {"debug", "info", "warning", "error"};
 constexpr int64_t kMostMib = 1LL << 40;
 constexpr double kMostSeconds = 1e8;
 
@@ -196,6 +199,11 @@ absl::Status Check(const Options& options) {
   if (options.executor != "local" && options.executor != "slurm") {
     return InvalidConfiguration(
         absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));
+  }
+  const auto is_level = [&](absl::string_view name) { return options.log_level == name; };
+  if (!std::ranges::any_of(kLogLevels, is_level)) {
+    return InvalidConfiguration(absl::StrCat("--log-level is \"", options.log_level,
+                                             "\"; it must be debug, info, warning or error"));
   }
   if (options.data_directory.empty()) return InvalidConfiguration("--data-dir names no folder");
   if (!options.slurm_upload.empty() && !IsHostAndPort(options.slurm_upload)) {
@@ -263,11 +271,13 @@ void AddFlags(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--client-share", options.client_share,
                  "share of all connections, scenes, streams, listeners, renderings, uploads and "
-                 "waiting jobs that "
-                 "one client may have, 0.001 to 1")
+                 "waiting jobs that one client may have, 0.001 to 1")
       ->capture_default_str();
   app.add_option("--metrics", options.metrics_address,
                  "HOST:PORT at which Prometheus reads metrics, by HTTP without TLS [nowhere]");
+  app.add_option("--log-level", options.log_level,
+                 "least level that is logged: debug, info, warning or error")
+      ->capture_default_str();
   app.add_option("--queue-limit", options.queue_limit, "decompositions that may wait at a time")
       ->capture_default_str();
   app.add_option("--model-budget-mib", options.model_budget_mib,

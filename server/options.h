@@ -43,10 +43,11 @@ struct Options {
   std::string tls_certificate_file;
   std::string tls_key_file;
   std::string tls_client_roots_file;
-  std::string access_file;      ///< path of the file of callers over TCP and their roles
-  double scene_grace_s = 60;    ///< time for which a scene waits for its clients
-  double client_share = 0.5;    ///< share of each limit that one client may use
-  std::string metrics_address;  ///< HOST:PORT for Prometheus; if empty, metrics are not served
+  std::string access_file;         ///< path of the file of callers over TCP and their roles
+  double scene_grace_s = 60;       ///< time for which a scene waits for its clients
+  double client_share = 0.5;       ///< share of each limit that one client may use
+  std::string metrics_address;     ///< HOST:PORT for Prometheus; if empty, metrics are not served
+  std::string log_level = "info";  ///< least level that is logged: debug, info, warning or error
 
   bool operator==(const Options&) const = default;
 };

@@ -12,6 +12,7 @@
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/call_name.h"
 #include "server/api/peer_name.h"
 
 namespace carillon {
@@ -94,14 +95,15 @@ std::shared_ptr<const AccessTable> AccessControl::table() const {
 }
 
 absl::StatusOr<Principal> AccessControl::Admit(const grpc::CallbackServerContext& context,
-                                               Role role) {
+                                               Role role, const char* function) {
   absl::StatusOr<Principal> principal = Identify(context);
-  if (!principal.ok()) return Refuse(context, principal.status());
+  if (!principal.ok()) return Refuse(context, function, principal.status());
+  principal->function = function;
   principal->connection = context.peer();
   principal->client = ClientOf(*principal);
   if (principal->has(role)) return principal;
   const bool is_anybody = principal->name == table()->anybody().name;
-  return Refuse(context, MissingRole(*principal, role, is_anybody));
+  return Refuse(context, function, MissingRole(*principal, role, is_anybody));
 }
 
 absl::StatusOr<Principal> AccessControl::Identify(const grpc::CallbackServerContext& context) {
@@ -125,9 +127,10 @@ std::string AccessControl::ClientOf(const Principal& caller) const {
   return caller.name;
 }
 
-absl::Status AccessControl::Refuse(const grpc::CallbackServerContext& context,
+absl::Status AccessControl::Refuse(const grpc::CallbackServerContext& context, const char* function,
                                    absl::Status status) {
-  log_.Warn(absl::StrCat("a call from ", context.peer(), " was refused: ", status.message()));
+  log_.Warn(absl::StrCat("a call of ", CallName(function), " from ", context.peer(),
+                         " was refused: ", status.message()));
   return status;
 }
 

@@ -11,8 +11,8 @@
 #include "absl/status/statusor.h"
 #include "server/api/access_table.h"
 #include "server/api/guess_limiter.h"
-#include "server/api/limited_log.h"
 #include "server/base/clock.h"
+#include "server/base/limited_log.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -34,10 +34,13 @@ class AccessControl {
 
   /// Returns the caller if it has the role. Errors: Unauthenticated (CREDENTIAL_MISSING,
   /// TOKEN_WRONG), PermissionDenied (ROLE_MISSING), ResourceExhausted (TOO_MANY_FAILURES).
-  absl::StatusOr<Principal> Admit(const grpc::CallbackServerContext& context, Role role);
+  /// `function` is the function that serves the call (CallName).
+  absl::StatusOr<Principal> Admit(const grpc::CallbackServerContext& context, Role role,
+                                  const char* function = __builtin_FUNCTION());
 
-  /// Logs that the caller was refused for `status`, and returns `status`.
-  absl::Status Refuse(const grpc::CallbackServerContext& context, absl::Status status);
+  /// Logs that the call which `function` serves was refused for `status`, and returns `status`.
+  absl::Status Refuse(const grpc::CallbackServerContext& context, const char* function,
+                      absl::Status status);
 
  private:
   absl::StatusOr<Principal> Identify(const grpc::CallbackServerContext& context);

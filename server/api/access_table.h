@@ -32,6 +32,7 @@ struct Principal {
   /// caller has shown a credential. Otherwise it is the process behind a Unix socket, or the
   /// caller's address over TCP (AddressOfPeer).
   std::string client{};
+  const char* function = "";  ///< the function that serves the call (CallName)
 
   bool has(Role role) const {
     return role == Role::kAny ? roles != 0 : (roles & static_cast<unsigned>(role)) != 0;

@@ -14,6 +14,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/exception_barrier.h"
 #include "server/api/file_pieces.h"
+#include "server/api/resource_name.h"
 #include "server/api/send_call.h"
 #include "server/api/unary_call.h"
 #include "server/mode_database/database.h"
@@ -37,21 +38,43 @@ v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   return proto;
 }
 
+Event CollectedEvent(const v1::CollectGarbageResponse& collected) {
+  return Event("models_collected")
+      .With("count", collected.deleted_count())
+      .With("bytes", collected.deleted_bytes())
+      .With("mesh_count", collected.deleted_mesh_count())
+      .With("mesh_bytes", collected.deleted_mesh_bytes());
+}
+
 /// Copies the database to a file in its folder when its turn comes, and sends the file piece by
 /// piece.
 class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
  public:
-  BackupCall(grpc::CallbackServerContext& context, const AdminContext& daemon,
-             const std::string& client, CallBounds bounds)
+  BackupCall(grpc::CallbackServerContext& context, const AdminContext& daemon, Principal caller,
+             CallBounds bounds)
       : SendCall(context, std::move(bounds), daemon.background.pool),
-        database_(daemon.database.database()) {
-    daemon.copying.Run(client, [this] {
+        database_(daemon.database.database()),
+        events_(daemon.background.events),
+        caller_(std::move(caller)) {
+    daemon.copying.Run(caller_.client, [this] {
       copied_ = WithoutExceptions([this] { return Copy(); });
       StartWriting();
     });
   }
 
+  ~BackupCall() override {
+    Event event("database_backed_up", sent_ ? LogLevel::kInfo : LogLevel::kWarning);
+    event.With("outcome", Outcome()).With("bytes", copied_byte_count_);
+    if (!copied_.ok()) event.With("message", copied_.message());
+    events_.Log(std::move(event), caller_);
+  }
+
  private:
+  absl::string_view Outcome() const {
+    if (sent_) return "sent";
+    return copied_.ok() || absl::IsCancelled(copied_) ? "cancelled" : "failed";
+  }
+
   absl::Status Copy() {
     const std::filesystem::path copy = NewBackupFile(database_.file());
     const absl::Cleanup remove = [&copy] {
@@ -61,7 +84,7 @@ class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
     RETURN_IF_ERROR(BackUp(database_, copy, [this] { return !is_cancelled(); }));
     pieces_.Open(copy);
     std::error_code error;
-    byte_count_ = std::filesystem::file_size(copy, error);
+    byte_count_ = copied_byte_count_ = std::filesystem::file_size(copy, error);
     if (!error) return absl::OkStatus();
     return Refusal(absl::StatusCode::kUnavailable, "DATABASE_IO_ERROR",
                    absl::StrCat("the unfinished backup ", copy.string(), " has gone (",
@@ -71,12 +94,19 @@ class BackupCall final : public SendCall<v1::BackUpDatabaseResponse> {
   absl::StatusOr<Supply> FillNext(v1::BackUpDatabaseResponse& response) override {
     RETURN_IF_ERROR(copied_);
     response.set_byte_count(std::exchange(byte_count_, 0));
-    return pieces_.Next(*response.mutable_data());
+    absl::StatusOr<Supply> supply = pieces_.Next(*response.mutable_data());
+    if (!supply.ok()) copied_ = supply.status();
+    sent_ = supply.ok() && *supply == Supply::kEnd;
+    return supply;
   }
 
   Database& database_;
-  absl::Status copied_;
+  CallEvents& events_;
+  const Principal caller_;
+  absl::Status copied_;  // or the error of reading the copy
+  bool sent_ = false;
   uint64_t byte_count_ = 0;  // until it has been sent
+  uint64_t copied_byte_count_ = 0;
   FilePieces pieces_;
 };
 
@@ -96,10 +126,10 @@ grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDataba
     grpc::CallbackServerContext* context, const v1::BackUpDatabaseRequest*) {
   using Reactor = grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>;
   return Open(
-      *context, daemon_.background, Role::kAdminister, Holding::kBackup,
+      *context, daemon_.background, {Role::kAdminister, Holding::kBackup},
       [&](const Principal& caller, ClientPlace place) -> Reactor* {
         return new BackupCall(
-            *context, daemon_, caller.client,
+            *context, daemon_, caller,
             {.place = std::move(place), .idle_calls = daemon_.idle_calls, .clock = daemon_.clock});
       });
 }
@@ -107,25 +137,41 @@ grpc::ServerWriteReactor<v1::BackUpDatabaseResponse>* AdminService::BackUpDataba
 grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerContext* context,
                                                        const v1::CollectGarbageRequest* request,
                                                        v1::CollectGarbageResponse* response) {
-  return Answer(context, daemon_.writing, Role::kAdminister, [this, request, response] {
-    if ((request->budget_bytes() == 0) != request->delete_unpinned()) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
-                     "set either budget_bytes above zero, or delete_unpinned to delete every model "
-                     "that is neither pinned nor sounding");
-    }
-    ASSIGN_OR_RETURN(const Collected models,
-                     daemon_.database.models().Collect(request->budget_bytes(),
-                                                       {.dry_run = request->dry_run()}));
-    response->set_deleted_count(models.model_count);
-    response->set_deleted_bytes(models.bytes);
-    const std::chrono::milliseconds life =
-        request->delete_unpinned() ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
-    ASSIGN_OR_RETURN(const CollectedMeshes meshes,
-                     daemon_.database.meshes().Collect(life, request->dry_run()));
-    response->set_deleted_mesh_count(meshes.mesh_count);
-    response->set_deleted_mesh_bytes(meshes.bytes);
-    return absl::OkStatus();
-  });
+  return Answer(context, daemon_.writing, Role::kAdminister,
+                [this, request, response](const Principal& caller) {
+                  return Collect(*request, caller, *response);
+                });
+}
+
+absl::Status AdminService::Collect(const v1::CollectGarbageRequest& request,
+                                   const Principal& caller, v1::CollectGarbageResponse& response) {
+  if ((request.budget_bytes() == 0) != request.delete_unpinned()) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
+                   "set either budget_bytes above zero, or delete_unpinned to delete every model "
+                   "that is neither pinned nor sounding");
+  }
+  const CallEvents& events = daemon_.writing.events;
+  const auto log_deleted = [&](const std::string& digest, uint64_t bytes) {
+    events.Log(Event("model_deleted")
+                   .With("model", ModelName(digest))
+                   .With("bytes", bytes)
+                   .With("cause", "collection"),
+               caller);
+  };
+  ASSIGN_OR_RETURN(
+      const Collected models,
+      daemon_.database.models().Collect(request.budget_bytes(),
+                                        {.dry_run = request.dry_run(), .on_deleted = log_deleted}));
+  response.set_deleted_count(models.model_count);
+  response.set_deleted_bytes(models.bytes);
+  const std::chrono::milliseconds life =
+      request.delete_unpinned() ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
+  ASSIGN_OR_RETURN(const CollectedMeshes meshes,
+                   daemon_.database.meshes().Collect(life, request.dry_run()));
+  response.set_deleted_mesh_count(meshes.mesh_count);
+  response.set_deleted_mesh_bytes(meshes.bytes);
+  if (!request.dry_run()) events.Log(CollectedEvent(response), caller);
+  return absl::OkStatus();
 }
 
 }  // namespace carillon

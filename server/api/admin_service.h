@@ -37,6 +37,9 @@ class AdminService final : public v1::AdminService::CallbackService {
                                            v1::CollectGarbageResponse* response) override;
 
  private:
+  absl::Status Collect(const v1::CollectGarbageRequest& request, const Principal& caller,
+                       v1::CollectGarbageResponse& response);
+
   const AdminContext daemon_;
 };
 

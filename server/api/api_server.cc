@@ -30,7 +30,6 @@
 #include "server/api/grpc_servers.h"
 #include "server/api/idle_calls.h"
 #include "server/api/job_run_service.h"
-#include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/api/modal_model_service.h"
 #include "server/api/scene_leases.h"
@@ -40,6 +39,7 @@
 #include "server/api/thread_pool.h"
 #include "server/api/timetable.h"
 #include "server/api/tls_credentials.h"
+#include "server/base/limited_log.h"
 #include "server/mode_database/database_keeper.h"
 
 namespace carillon {
@@ -107,6 +107,7 @@ struct ApiServer::State {
         grpc_log(rooms.clock, rooms.log),
         client_log(rooms.clock, "clients", rooms.log),
         access(std::move(table), rooms.clock, rooms.log),
+        events(rooms.clock, rooms.log_event),
         limits(settings.client_share),
         leases(rooms.clock, Duration(settings.scene_grace_s),
                [this](const std::string& connection) { return IsOpen(connection); }),
@@ -162,6 +163,8 @@ struct ApiServer::State {
         output(rooms.output),
         log(rooms.log),
         log_error(rooms.log_error),
+        log_event(rooms.log_event),
+        precompute_program(settings.precompute_program),
         can_decompose(rooms.can_decompose) {}
 
   absl::Status Listen(const ApiSettings& settings);
@@ -190,6 +193,7 @@ struct ApiServer::State {
   GrpcLog grpc_log;
   LimitedLog client_log;
   AccessControl access;
+  CallEvents events;
   ClientLimits limits;
   SceneLeases leases;
   SceneOwners owners;
@@ -208,9 +212,9 @@ struct ApiServer::State {
   ThreadPool call_pool{kCallThreadCount};
   ThreadPool write_pool{kWriteThreadCount};
   ThreadPool background_pool{kBackgroundThreadCount, kBackgroundNiceness};
-  const Reception reception{access, limits, call_pool};
-  const Reception writing{access, limits, write_pool};
-  const Reception background{access, limits, background_pool};
+  const Reception reception{access, limits, call_pool, events};
+  const Reception writing{access, limits, write_pool, events};
+  const Reception background{access, limits, background_pool, events};
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
@@ -223,6 +227,8 @@ struct ApiServer::State {
   LiveOutput& output;
   const std::function<void(const std::string& line)> log;
   const std::function<void(const std::string& line)> log_error;
+  const EventSink log_event;
+  const std::string precompute_program;
   const std::function<bool()> can_decompose;
   /// The credentials of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
@@ -295,7 +301,9 @@ void ApiServer::State::KeepClients() {
 void ApiServer::State::ShowWorkers(bool can) {
   if (decomposes.exchange(can) == can) return;
   servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
-  if (!can) log("decompositions cannot run: their program is missing");
+  log_event(Event(can ? "decompositions_possible" : "decompositions_impossible",
+                  can ? LogLevel::kInfo : LogLevel::kWarning)
+                .With("program", precompute_program));
 }
 
 void ApiServer::State::ShowDatabase(const absl::Status& state) {

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "server/api/tls_files.h"
 #include "server/base/clock.h"
+#include "server/base/event.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/live_output/live_output.h"
@@ -41,6 +42,8 @@ struct ApiSettings {
   double client_share = 0.5;
   /// Seconds after which a rendering ends if its client neither sends nor reads.
   double rendering_idle_s = 60;
+  /// Path of the program that computes decompositions, for the log.
+  std::string precompute_program{};
   /// Whether decompositions run on the cluster that Slurm manages.
   bool slurm = false;
 };
@@ -56,6 +59,7 @@ struct ServedRooms {
   std::function<void(const std::string& line)> log;  ///< takes warnings
   /// Takes lines that say why the database cannot be changed.
   std::function<void(const std::string& line)> log_error = [](const std::string&) {};
+  EventSink log_event = [](const Event&) {};  ///< takes what calls have done
   /// Returns whether decompositions can run. Called several times a second.
   std::function<bool()> can_decompose = [] { return true; };
 };

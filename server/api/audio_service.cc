@@ -15,7 +15,7 @@ namespace carillon {
 
 grpc::ServerWriteReactor<v1::ListenResponse>* AudioService::Listen(
     grpc::CallbackServerContext* context, const v1::ListenRequest* request) {
-  return Open(*context, daemon_.reception, Role::kListen, Holding::kListener,
+  return Open(*context, daemon_.reception, {Role::kListen, Holding::kListener},
               [&](const Principal& caller, ClientPlace place) {
                 return MakeListenCall(daemon_.output, HeardBus(*context, caller, request->scene()),
                                       *request, std::move(place));
@@ -34,7 +34,7 @@ absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
     grpc::CallbackServerContext* context) {
-  return Open(*context, daemon_.reception, Role::kStrike, Holding::kRendering,
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kRendering},
               [this, context](const Principal& caller, ClientPlace place) {
                 ClientLimits& limits = daemon_.reception.limits;
                 return MakeRenderCall(
@@ -63,15 +63,20 @@ grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* co
 grpc::ServerUnaryReactor* AudioService::UpdateMixer(grpc::CallbackServerContext* context,
                                                     const v1::UpdateMixerRequest* request,
                                                     v1::UpdateMixerResponse* response) {
-  return Answer(context, daemon_.reception, Role::kAdminister, [this, request, response] {
+  const auto update = [this, request, response](const Principal& caller) {
     if (request->has_gain()) RETURN_IF_ERROR(ValidateGain(request->gain()));
     const OutputVolume volume = daemon_.output.ChangeVolume(
         request->has_gain() ? std::optional(request->gain()) : std::nullopt,
         request->has_muted() ? std::optional(request->muted()) : std::nullopt);
     response->set_gain(volume.gain);
     response->set_muted(volume.muted);
+    daemon_.reception.events.Log(Event("mixer_changed")
+                                     .With("gain", volume.gain)
+                                     .With("muted", volume.muted ? "true" : "false"),
+                                 caller);
     return absl::OkStatus();
-  });
+  };
+  return Answer(context, daemon_.reception, Role::kAdminister, update);
 }
 
 void AudioService::Describe(v1::GetMixerResponse& mixer) const {

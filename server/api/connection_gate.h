@@ -15,10 +15,10 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
-#include "server/api/limited_log.h"
 #include "server/api/listen_address.h"
 #include "server/api/socket_file.h"
 #include "server/api/tcp_bytes.h"
+#include "server/base/limited_log.h"
 #include "server/base/mutex.h"
 
 namespace carillon {

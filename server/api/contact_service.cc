@@ -292,13 +292,13 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
     }
     return new RecordCall(clients_.recorders, scene, std::move(place));
   };
-  return Open(*context, daemon_.reception, Role::kStrike, Holding::kListener, make);
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kListener}, make);
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>*
 ContactService::StreamContactsRaw(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>;
-  return Open(*context, daemon_.reception, Role::kStrike, Holding::kContactStream,
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kContactStream},
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
                 return new ContactCall(daemon_, clients_, *context, caller, std::move(place));
               });

@@ -167,11 +167,20 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
 grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerContext* context,
                                                           const v1::CancelJobRequest* request,
                                                           v1::CancelJobResponse* response) {
-  return Answer(context, writing_, Role::kSubmit, [this, request, response] {
-    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
-    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
-    return absl::OkStatus();
-  });
+  return Answer(
+      context, writing_, Role::kSubmit, [this, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
+        ASSIGN_OR_RETURN(const v1::Job before, queue_.Get(digest));
+        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
+        // A job that has ended stays as it is, also if it ended between the two calls.
+        const v1::JobState state = response->job().state();
+        const bool ended = state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED;
+        if (HasEnded(before) || ended) return absl::OkStatus();
+        writing_.events.LogCancelled(
+            Event("job_cancelled").With("job", before.name()).WithSome("label", before.label()),
+            caller);
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* DecompositionService::WatchJob(

@@ -9,8 +9,8 @@
 
 #include "server/api/connection_calls.h"
 #include "server/api/connection_gate.h"
-#include "server/api/limited_log.h"
 #include "server/api/tcp_bytes.h"
+#include "server/base/limited_log.h"
 
 namespace carillon {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "server/api/limited_log.h"
+#include "server/base/limited_log.h"
 
 namespace carillon {
 

@@ -8,8 +8,8 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/string_view.h"
-#include "server/api/limited_log.h"
 #include "server/base/clock.h"
+#include "server/base/limited_log.h"
 #include "server/base/mutex.h"
 
 namespace carillon {

@@ -25,20 +25,22 @@ absl::Status Incomplete(absl::string_view what) {
 /// A caller that shows the token of a run. Wrong tokens are logged.
 class RunCaller {
  public:
-  RunCaller(AccessControl& access, const grpc::CallbackServerContext& context)
-      : access_(&access), context_(&context), token_(BearerToken(context)) {}
+  RunCaller(AccessControl& access, const grpc::CallbackServerContext& context,
+            const char* function = __builtin_FUNCTION())
+      : access_(&access), context_(&context), function_(function), token_(BearerToken(context)) {}
 
   const std::string& token() const { return token_; }
 
   /// Returns `status`. Logs it if it is the refusal of a token.
   absl::Status Note(absl::Status status) const {
     if (!absl::IsPermissionDenied(status)) return status;
-    return access_->Refuse(*context_, std::move(status));
+    return access_->Refuse(*context_, function_, std::move(status));
   }
 
  private:
   AccessControl* access_;
   const grpc::CallbackServerContext* context_;
+  const char* function_;  ///< that serves the call
   std::string token_;
 };
 

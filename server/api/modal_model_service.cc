@@ -5,6 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/model_streams.h"
@@ -29,11 +33,39 @@ ModelFilter FilterOf(const v1::ListModalModelsRequest& request) {
   return filter;
 }
 
+absl::string_view NameOf(v1::JobState state) {
+  absl::string_view name = v1::JobState_Name(state);
+  absl::ConsumePrefix(&name, "JOB_STATE_");
+  return name;
+}
+
+/// The event for a job that was requested. A job may have ended before, with success or not.
+Event Submitted(const v1::Job& job) {
+  return Event("job_submitted")
+      .With("job", job.name())
+      .WithSome("label", job.label())
+      .With("state", absl::AsciiStrToLower(NameOf(job.state())));
+}
+
+/// The event for a model that was changed, with the wanted changes.
+Event Updated(const v1::UpdateModalModelRequest& request) {
+  Event event("model_updated");
+  event.With("model", request.name());
+  if (request.has_label()) event.With("label", request.label());
+  if (request.has_pinned()) event.With("pinned", request.pinned() ? "true" : "false");
+  if (request.has_material()) {
+    const std::string& preset = request.material().preset();
+    event.With("material", preset.empty() ? "without_preset" : preset);
+  }
+  return event.WithSome("add_tags", absl::StrJoin(request.add_tags(), ","))
+      .WithSome("remove_tags", absl::StrJoin(request.remove_tags(), ","));
+}
+
 }  // namespace
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::UploadMeshRaw(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
-  return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
+  return Open(*context, daemon_.writing, {Role::kSubmit, Holding::kUpload},
               [&](const Principal&, ClientPlace place) {
                 return MakeUpload(*context, *response, database_.meshes(), daemon_.writing.pool,
                                   BoundsOf(std::move(place)));
@@ -46,6 +78,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
   return Answer(
       context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client));
+        daemon_.writing.events.LogSubmitted(Submitted(response->job()), caller);
         return absl::OkStatus();
       });
 }
@@ -61,6 +94,8 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
                          MaterialOrModels(request->material(), digest, database_.models()));
         ASSIGN_OR_RETURN(*response->mutable_job(),
                          queue_.SubmitTransfer(digest, whole, caller.client));
+        daemon_.writing.events.LogSubmitted(
+            Submitted(response->job()).With("transfer_of", request->modal_model()), caller);
         return absl::OkStatus();
       });
 }
@@ -83,30 +118,41 @@ grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
     grpc::CallbackServerContext* context, const v1::UpdateModalModelRequest* request,
     v1::UpdateModalModelResponse* response) {
   return Answer(context, daemon_.writing, Role::kSubmit,
-                [this, request, response] { return Update(*request, *response); });
+                [this, request, response](const Principal& caller) {
+                  RETURN_IF_ERROR(Update(*request, *response));
+                  daemon_.writing.events.LogUpdated(Updated(*request), caller);
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
     grpc::CallbackServerContext* context, const v1::DeleteModalModelRequest* request,
     v1::DeleteModalModelResponse*) {
-  return Answer(context, daemon_.writing, Role::kAdminister, [this, request] {
-    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->name()));
-    return queue_.DeleteModel(digest);
-  });
+  return Answer(
+      context, daemon_.writing, Role::kAdminister, [this, request](const Principal& caller) {
+        ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request->name()));
+        RETURN_IF_ERROR(queue_.DeleteModel(digest));
+        daemon_.writing.events.Log(Event("model_deleted").With("model", ModelName(digest)), caller);
+        return absl::OkStatus();
+      });
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::ImportModalModelRaw(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
-  return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
-              [&](const Principal&, ClientPlace place) {
-                return MakeImport(*context, *response, database_, daemon_.writing.pool,
+  return Open(*context, daemon_.writing, {Role::kSubmit, Holding::kUpload},
+              [&](const Principal& caller, ClientPlace place) {
+                const auto on_stored = [&events = daemon_.writing.events,
+                                        caller](const Event& event) {
+                  events.LogImported(event, caller);
+                };
+                return MakeImport(*context, *response, {database_, on_stored}, daemon_.writing.pool,
                                   BoundsOf(std::move(place)));
               });
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::ExportModalModel(
     grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) {
-  return Open(*context, daemon_.reception, Role::kSubmit, Holding::kExport,
+  return Open(*context, daemon_.reception, {Role::kSubmit, Holding::kExport},
               [&](const Principal&, ClientPlace place) {
                 return MakeExport(*context, *request, database_, daemon_.reception.pool,
                                   BoundsOf(std::move(place)));

@@ -52,8 +52,10 @@ class MeshSink {
 
 class ModelSink {
  public:
-  explicit ModelSink(ModeDatabase& database)
-      : database_(&database), transfers_(database.database()) {}
+  explicit ModelSink(ImportTarget target)
+      : database_(&target.database),
+        log_event_(std::move(target.log_event)),
+        transfers_(target.database.database()) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));
@@ -75,6 +77,11 @@ class ModelSink {
     RETURN_IF_ERROR(transfers_.ForEach(
         [](const StoredTransfer& transfer) { return CheckFigures(transfer.header()); }));
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
+    log_event_(Event("model_imported")
+                   .With("model", ModelName(summary.digest))
+                   .WithSome("label", summary.label)
+                   .With("modes", summary.header.mode_count())
+                   .With("bytes", summary.stored_bytes));
     RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
       return database_->transfers().Put(summary.digest, transfer).status();
     }));
@@ -92,6 +99,7 @@ class ModelSink {
   }
 
   ModeDatabase* database_;
+  EventSink log_event_;
   std::optional<ModelImport> import_;
   TransferSpool transfers_;
 };
@@ -158,10 +166,10 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
                                                       v1::ImportModalModelResponse& response,
-                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      ImportTarget target, ThreadPool& pool,
                                                       CallBounds bounds) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
-      context, response, ModelSink(database), pool, std::move(bounds));
+      context, response, ModelSink(std::move(target)), pool, std::move(bounds));
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(

@@ -7,6 +7,7 @@
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/api/call_bounds.h"
 #include "server/api/thread_pool.h"
+#include "server/base/event.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
@@ -19,9 +20,15 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
                                                       MeshStore& meshes, ThreadPool& pool,
                                                       CallBounds bounds);
 
+/// The database into which a model is imported, and the log of the import.
+struct ImportTarget {
+  ModeDatabase& database;
+  EventSink log_event;
+};
+
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
                                                       v1::ImportModalModelResponse& response,
-                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      ImportTarget target, ThreadPool& pool,
                                                       CallBounds bounds);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(

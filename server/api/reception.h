@@ -6,17 +6,20 @@
 #include <type_traits>
 
 #include "server/api/access_control.h"
+#include "server/api/call_events.h"
 #include "server/api/client_limits.h"
 #include "server/api/stream_call.h"
 #include "server/api/thread_pool.h"
 
 namespace carillon {
 
-/// The access control, limits and threads that every call passes through before its work begins.
+/// The access control, limits and threads that every call passes through before its work begins,
+/// and the log of what calls have done.
 struct Reception {
   AccessControl& access;
   ClientLimits& limits;
   ThreadPool& pool;
+  CallEvents& events;
 };
 
 /// A call that is refused before its work begins.
@@ -29,25 +32,34 @@ class RefusedCall final : public StreamCall<Reactor> {
 };
 
 /// Returns the reactor of a streaming call that `make()` makes if the caller has the role.
+/// `function` is the function that serves the call.
 template <typename Make>
 auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
-          Make make) -> decltype(make()) {
-  const absl::Status admitted = reception.access.Admit(context, role).status();
+          Make make, const char* function = __builtin_FUNCTION()) -> decltype(make()) {
+  const absl::Status admitted = reception.access.Admit(context, role, function).status();
   if (admitted.ok()) return make();
   return new RefusedCall<std::remove_pointer_t<decltype(make())>>(admitted);
 }
 
+/// The role that a call needs, and the place that it holds.
+struct CallNeeds {
+  Role role;
+  Holding holding;
+};
+
 /// Returns the reactor of a streaming call that holds a place of its client (ClientLimits).
 /// `make(caller, place)` makes the reactor and takes the place.
 template <typename Make>
-auto Open(const grpc::CallbackServerContext& context, const Reception& reception, Role role,
-          Holding holding, Make make) -> decltype(make(Principal(), ClientPlace())) {
+auto Open(const grpc::CallbackServerContext& context, const Reception& reception,
+          const CallNeeds& needs, Make make, const char* function = __builtin_FUNCTION())
+    -> decltype(make(Principal(), ClientPlace())) {
   using Reactor = std::remove_pointer_t<decltype(make(Principal(), ClientPlace()))>;
-  const absl::StatusOr<Principal> caller = reception.access.Admit(context, role);
+  const absl::StatusOr<Principal> caller = reception.access.Admit(context, needs.role, function);
   if (!caller.ok()) return new RefusedCall<Reactor>(caller.status());
-  absl::StatusOr<ClientPlace> place = reception.limits.Take(holding, caller->client);
-  if (!place.ok())
-    return new RefusedCall<Reactor>(reception.access.Refuse(context, place.status()));
+  absl::StatusOr<ClientPlace> place = reception.limits.Take(needs.holding, caller->client);
+  if (!place.ok()) {
+    return new RefusedCall<Reactor>(reception.access.Refuse(context, function, place.status()));
+  }
   return make(*caller, *std::move(place));
 }
 

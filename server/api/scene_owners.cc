@@ -69,9 +69,10 @@ absl::Status SceneOwners::CheckMadeBy(const grpc::CallbackServerContext& context
                    absl::StrCat(name, " ends just now: make it again"));
   }
   if (made->owner != caller.name) {
-    return access_.Refuse(context, Refusal(absl::StatusCode::kAlreadyExists, "SCENE_ID_TAKEN",
-                                           absl::StrCat(name, " belongs to another caller than ",
-                                                        caller.name, ": choose another id")));
+    return access_.Refuse(context, caller.function,
+                          Refusal(absl::StatusCode::kAlreadyExists, "SCENE_ID_TAKEN",
+                                  absl::StrCat(name, " belongs to another caller than ",
+                                               caller.name, ": choose another id")));
   }
   if (made->wish != wish) {
     return Refusal(absl::StatusCode::kAlreadyExists, "SCENE_DIFFERS",
@@ -97,9 +98,10 @@ absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, cons
     return absl::OkStatus();
   }
   return access_.Refuse(
-      context, Refusal(absl::StatusCode::kPermissionDenied, "SCENE_OF_ANOTHER",
-                       absl::StrCat(scenes_.NameOf(scene), " belongs to another caller than ",
-                                    caller.name, ": make a scene with SceneService.CreateScene")));
+      context, caller.function,
+      Refusal(absl::StatusCode::kPermissionDenied, "SCENE_OF_ANOTHER",
+              absl::StrCat(scenes_.NameOf(scene), " belongs to another caller than ", caller.name,
+                           ": make a scene with SceneService.CreateScene")));
 }
 
 }  // namespace carillon

@@ -74,6 +74,7 @@ grpc::ServerUnaryReactor* SceneService::DeleteScene(grpc::CallbackServerContext*
         ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->name()));
         RETURN_IF_ERROR(scenes_.DeleteScene(scene));
         owners_.Remove(scene);
+        LogDeleted(request->name(), caller);
         return absl::OkStatus();
       });
 }
@@ -154,12 +155,11 @@ grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* c
 grpc::ServerUnaryReactor* SceneService::AddObjects(grpc::CallbackServerContext* context,
                                                    const v1::AddObjectsRequest* request,
                                                    v1::AddObjectsResponse* response) {
-  return AnswerFairly(context, reception_, Role::kStrike, adding_,
-                      [this, context, request, response](const Principal& caller) {
-                        ASSIGN_OR_RETURN(const uint64_t scene,
-                                         owners_.Parse(*context, caller, request->scene()));
-                        return AddAll(*context, scene, *request, *response);
-                      });
+  return AnswerFairly(
+      context, reception_, adding_, [this, context, request, response](const Principal& caller) {
+        ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
+        return AddAll(*context, scene, *request, *response);
+      });
 }
 
 grpc::ServerUnaryReactor* SceneService::UpdateObject(grpc::CallbackServerContext* context,
@@ -226,16 +226,18 @@ absl::StatusOr<uint64_t> SceneService::CreateNew(const grpc::CallbackServerConte
                                                  const Principal& caller, const std::string& id,
                                                  const SceneWish& wish) {
   absl::StatusOr<ClientPlace> place = reception_.limits.Take(Holding::kScene, caller.client);
-  if (!place.ok() && EndAbandoned(caller.client)) {
+  if (!place.ok() && EndAbandoned(caller, caller.client)) {
     place = reception_.limits.Take(Holding::kScene, caller.client);
   }
-  if (!place.ok()) return reception_.access.Refuse(context, place.status());
+  if (!place.ok()) return reception_.access.Refuse(context, caller.function, place.status());
   absl::StatusOr<uint64_t> scene = scenes_.CreateScene(wish.space, wish.gain, caller.name, id);
-  if (absl::IsResourceExhausted(scene.status()) && EndAbandoned(std::nullopt)) {
+  if (absl::IsResourceExhausted(scene.status()) && EndAbandoned(caller, std::nullopt)) {
     scene = scenes_.CreateScene(wish.space, wish.gain, caller.name, id);
   }
   RETURN_IF_ERROR(scene.status());
   owners_.Add(*scene, caller, *std::move(place), wish);
+  reception_.events.LogScene(
+      Event("scene_created", LogLevel::kDebug).With("scene", scenes_.NameOf(*scene)), caller);
   return scene;
 }
 
@@ -254,12 +256,17 @@ absl::StatusOr<uint64_t> SceneService::Parse(const grpc::CallbackServerContext& 
   return scene;
 }
 
-bool SceneService::EndAbandoned(const std::optional<std::string>& client) {
+bool SceneService::EndAbandoned(const Principal& caller, const std::optional<std::string>& client) {
   const std::optional<uint64_t> abandoned = owners_.LongestAbandoned(client);
   if (!abandoned) return false;
-  scenes_.DeleteScene(*abandoned).IgnoreError();
+  const std::string name = scenes_.NameOf(*abandoned);
+  if (scenes_.DeleteScene(*abandoned).ok()) LogDeleted(name, caller);
   owners_.Remove(*abandoned);
   return true;
+}
+
+void SceneService::LogDeleted(const std::string& name, const Principal& caller) const {
+  reception_.events.LogScene(Event("scene_deleted", LogLevel::kDebug).With("scene", name), caller);
 }
 
 absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {

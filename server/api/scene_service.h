@@ -79,9 +79,11 @@ class SceneService final : public v1::SceneService::CallbackService {
   absl::Status Describe(uint64_t scene, v1::Scene& described) const;
   absl::StatusOr<uint64_t> Parse(const grpc::CallbackServerContext& context,
                                  const Principal& caller, const ObjectName& name) const;
-  /// Ends the scene that was abandoned for the longest time, among those of `client` or among all.
-  /// Returns false if no scene is abandoned.
-  bool EndAbandoned(const std::optional<std::string>& client);
+  /// Makes room for a scene of `caller`: ends the scene that was abandoned for the longest time,
+  /// among those of `client` or among all. Returns false if no scene is abandoned.
+  bool EndAbandoned(const Principal& caller, const std::optional<std::string>& client);
+  /// Logs that a call of `caller` has deleted the scene.
+  void LogDeleted(const std::string& name, const Principal& caller) const;
   /// Checks that the scene's client may have this number of further objects, in all its scenes
   /// together. Errors: ResourceExhausted (CLIENT_LIMIT_REACHED).
   absl::Status CheckObjectCount(uint64_t scene, size_t more) const;

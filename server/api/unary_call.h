@@ -27,14 +27,13 @@ grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, ThreadPoo
   return reactor;
 }
 
-/// Answers a call that needs a role. `run(const Principal&, step)` runs the step on a thread that
-/// may block.
+/// Answers a call whose caller is admitted or refused. `run(const Principal&, step)` runs the step
+/// on a thread that may block.
 template <typename Run, typename Work>
 grpc::ServerUnaryReactor* AnswerAdmitted(grpc::CallbackServerContext* context,
-                                         const Reception& reception, Role role, Run run,
+                                         const absl::StatusOr<Principal>& caller, Run run,
                                          Work work) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const absl::StatusOr<Principal> caller = reception.access.Admit(*context, role);
   if (!caller.ok()) {
     reactor->Finish(ToGrpcStatus(caller.status()));
     return reactor;
@@ -52,26 +51,29 @@ grpc::ServerUnaryReactor* AnswerAdmitted(grpc::CallbackServerContext* context,
 }
 
 /// Answers a call that needs a role on a thread of the reception's pool. If the work needs the
-/// caller, it may be `work(const Principal&)`.
+/// caller, it may be `work(const Principal&)`. `function` is the function that serves the call.
 template <typename Work>
 grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext* context, const Reception& reception,
-                                 Role role, Work work) {
+                                 Role role, Work work,
+                                 const char* function = __builtin_FUNCTION()) {
   const auto run = [&](const Principal&, std::function<void()> step) {
     reception.pool.Run(std::move(step));
   };
-  return AnswerAdmitted(context, reception, role, run, std::move(work));
+  return AnswerAdmitted(context, reception.access.Admit(*context, role, function), run,
+                        std::move(work));
 }
 
-/// The same for a call that keeps a thread busy for long. The clients share the threads of
-/// `turns` fairly.
+/// The same for a call that needs the role strike and keeps a thread busy for long. The clients
+/// share the threads of `turns` fairly.
 template <typename Work>
 grpc::ServerUnaryReactor* AnswerFairly(grpc::CallbackServerContext* context,
-                                       const Reception& reception, Role role, FairTurns& turns,
-                                       Work work) {
+                                       const Reception& reception, FairTurns& turns, Work work,
+                                       const char* function = __builtin_FUNCTION()) {
   const auto run = [&](const Principal& caller, std::function<void()> step) {
     turns.Run(caller.client, std::move(step));
   };
-  return AnswerAdmitted(context, reception, role, run, std::move(work));
+  return AnswerAdmitted(context, reception.access.Admit(*context, Role::kStrike, function), run,
+                        std::move(work));
 }
 
 }  // namespace carillon

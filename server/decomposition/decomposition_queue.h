@@ -12,6 +12,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
+#include "server/base/event.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/job_sink.h"
 #include "server/decomposition/phase_usage.h"
@@ -36,6 +37,8 @@ struct QueueSettings {
   bool transfers = false;
   /// Takes log lines about events that no call reports. Any thread may call it.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
+  /// Takes the failures and results of jobs, within limits (JobEvents).
+  EventSink log_event = [](const Event&) {};
 };
 
 struct DecompositionJobPage {

@@ -43,6 +43,7 @@ JobRuns::JobRuns(ModeDatabase& database, std::unique_ptr<Executor> executor, con
       clock_(clock),
       jobs_(jobs),
       settings_(std::move(settings)),
+      events_(clock, settings_.log_event),
       executor_(std::move(executor)),
       worker_count_(executor_->worker_count()) {
   jobs_.SetCapacity({.worker_count = worker_count_,
@@ -166,14 +167,14 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
     ActiveJob job = jobs_.EndRun(digest);
     LearnFrom(job, result);
     // Fails if the model was deleted before it was stored: then there is none.
-    if (job.deleted) database_.models().Delete(digest).IgnoreError();
+    if (job.deleted && database_.models().Delete(digest).ok()) events_.LogDeletedResult(digest);
     job.record.start_count = 0;
     if (RunsAgain(job, result)) {
       job.again = job.deleted = job.yields = false;
       notices.push_back(jobs_.QueueAgain(std::move(job)));
     } else {
       if (result.verdict == Verdict::kOk && !job.deleted) FollowByTransfer(job);
-      notices.push_back(Finish(std::move(job.record), result, job.deleted));
+      notices.push_back(Finish(std::move(job), result));
       ReleaseWaiting(digest, notices);
     }
     StartWhatFits(notices);
@@ -192,16 +193,25 @@ Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
     const std::optional<ActiveJob> job = jobs_.Find(digest);
     const bool cancelled = told && job->record.state == v1::JOB_STATE_CANCELLED;
     if (job->deleted || cancelled) return {Verdict::kCancelled, {}, {}};
-    stored =
-        job->record.transfer_of.empty()
-            ? database_.models().PutFile(digest, job->record.label, outcome.model_file).status()
-            : database_.transfers().PutFile(job->record.transfer_of, outcome.model_file).status();
+    stored = PutResult(job->record, outcome.model_file);
     if (stored.ok()) return outcome;
     if (ToErrorInfo(stored).reason() != "DATABASE_BUSY" || stops()) break;
     if (!told)
       settings_.log(absl::StrCat("the result of jobs/", digest, " waits: ", stored.message()));
   }
   return {Verdict::kCrashed, ToErrorInfo(stored), {}};
+}
+
+absl::Status JobRuns::PutResult(const JobRecord& job, const std::filesystem::path& file) {
+  if (!job.transfer_of.empty()) {
+    const absl::Status stored = database_.transfers().PutFile(job.transfer_of, file).status();
+    if (stored.ok()) events_.LogTransfer(job);
+    return stored;
+  }
+  const absl::StatusOr<ModelSummary> model =
+      database_.models().PutFile(job.digest, job.label, file);
+  if (model.ok()) events_.LogModel(*model);
+  return model.status();
 }
 
 bool JobRuns::stops() const {
@@ -250,14 +260,18 @@ void JobRuns::CountEnd(v1::JobState state) {
   ended_.cancelled += state == v1::JOB_STATE_CANCELLED ? 1 : 0;
 }
 
-Notice JobRuns::Finish(JobRecord record, const Outcome& result, bool deleted) {
+Notice JobRuns::Finish(ActiveJob job, const Outcome& result) {
+  JobRecord& record = job.record;
   record.state = StateOf(result.verdict);
   CountEnd(record.state);
   record.remembered = IsDeterministic(result);
-  if (record.state == v1::JOB_STATE_FAILED) record.error = result.error;
+  if (record.state == v1::JOB_STATE_FAILED) {
+    record.error = result.error;
+    events_.LogFailure(record, job.client);
+  }
   // If the end cannot be stored, the row still says queued, and the next start of the daemon ends
   // the job.
-  if (!deleted) database_.jobs().Put(record).IgnoreError();
+  if (!job.deleted) database_.jobs().Put(record).IgnoreError();
   return jobs_.Remove(record.digest, ToJob(record));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "server/decomposition/active_jobs.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/job_events.h"
 #include "server/decomposition/phase_usage.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
@@ -58,6 +60,8 @@ class JobRuns {
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
+  JobEvents& events() { return events_; }
+
   /// Returns the numbers of ended runs by the outcome of their jobs, and the cost of each phase.
   DecompositionQueue::Counts ended();
 
@@ -71,18 +75,19 @@ class JobRuns {
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
   Outcome Store(const std::string& digest, const Outcome& outcome);
+  absl::Status PutResult(const JobRecord& job, const std::filesystem::path& file);
   bool stops() const ABSL_LOCKS_EXCLUDED(writer_);
   void FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   bool RunsAgain(ActiveJob& job, const Outcome& result) const;
   void CountEnd(v1::JobState state);
-  Notice Finish(JobRecord record, const Outcome& result, bool deleted)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  Notice Finish(ActiveJob job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   void LearnFrom(ActiveJob& job, const Outcome& result) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   ModeDatabase& database_;
   const Clock& clock_;
   ActiveJobs& jobs_;
   const QueueSettings settings_;
+  JobEvents events_;
   mutable Mutex writer_;
   Mutex ended_mutex_ ABSL_ACQUIRED_AFTER(writer_);
   bool stopping_ ABSL_GUARDED_BY(writer_) = false;

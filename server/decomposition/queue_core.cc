@@ -72,7 +72,7 @@ absl::Status QueueCore::TakeUp() {
 
 absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
   if (record.damaged) {
-    settings_.log(record.error.message());
+    runs_.events().LogFailure(record, "");
     return database_.jobs().Put(record);
   }
   auto request = ParseRequest(record);
@@ -90,10 +90,9 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
   // A satisfied job has its result: the daemon was killed before it stored the job's end.
   if (satisfied.ok() && *satisfied) FollowByTransfer(wanted, notices);
   record.state = satisfied.ok() && *satisfied ? v1::JOB_STATE_SUCCEEDED : v1::JOB_STATE_FAILED;
-  if (!satisfied.ok()) record.error = ToErrorInfo(satisfied.status());
-  if (satisfied.ok() && !*satisfied) {
-    record.error = GaveUp(start_count);
-    settings_.log(absl::StrCat("jobs/", record.digest, ": ", record.error.message()));
+  if (record.state == v1::JOB_STATE_FAILED) {
+    record.error = satisfied.ok() ? GaveUp(start_count) : ToErrorInfo(satisfied.status());
+    runs_.events().LogFailure(record, "");
   }
   return database_.jobs().Put(record);
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -173,13 +172,7 @@ absl::StatusOr<ModelSummary> ModelStore::Store(
     summary = named;
     return InsertModel(connection, records, summary);
   }));
-  if (budget_.bytes == 0) return summary;
-  const absl::StatusOr<Collected> collected = Collect(budget_.bytes, {.spared = summary.digest});
-  if (!collected.ok()) {
-    budget_.log(std::string(collected.status().message()));
-  } else if (collected->model_count > 0) {
-    budget_.log(absl::StrCat(collected->model_count, " models were deleted to keep to the budget"));
-  }
+  if (budget_.bytes > 0) CollectBeyondBudget(summary.digest);
   return summary;
 }
 
@@ -338,66 +331,6 @@ absl::StatusOr<ModelSummary> ModelStore::Update(const std::string& digest,
 absl::Status ModelStore::Delete(const std::string& digest) {
   return database_->WriteToFree(
       [&](SqliteConnection& connection) { return DeleteModelRows(connection, digest); });
-}
-
-bool ModelStore::InMemory(const std::string& digest) const {
-  const auto cached = cache_.find(digest);
-  return cached != cache_.end() && !cached->second.model.expired();
-}
-
-absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
-  for (const auto& [digest, unix_ms] : sounded_) {
-    RETURN_IF_ERROR(StoreSounded(connection, digest, unix_ms));
-  }
-  return absl::OkStatus();
-}
-
-absl::StatusOr<Collected> ModelStore::Collect(uint64_t budget_bytes,
-                                              const CollectSettings& settings) {
-  // The log of a full disk has room for the deletion of a few models at a time.
-  const size_t most = settings.dry_run ? std::numeric_limits<size_t>::max() : 16;
-  Collected all;
-  Collected some;
-  do {
-    ASSIGN_OR_RETURN(some, CollectSome(budget_bytes, settings, most));
-    all = {all.model_count + some.model_count, all.bytes + some.bytes};
-  } while (some.model_count == most);
-  return all;
-}
-
-absl::StatusOr<Collected> ModelStore::CollectSome(uint64_t budget_bytes,
-                                                  const CollectSettings& settings, size_t most) {
-  Collected collected;
-  std::map<std::string, int64_t> stored;
-  const auto collect = [&](SqliteConnection& connection) {
-    // Nobody who loads a model waits meanwhile for the disk or for another process, because the
-    // transaction has begun.
-    const MutexLock lock(&cache_mutex_);
-    collected = {};
-    stored = sounded_;
-    RETURN_IF_ERROR(WriteSounded(connection));
-    std::vector<ModelSize> oldest_first;
-    uint64_t total_bytes = 0;
-    RETURN_IF_ERROR(SelectSizes(connection, [&](const ModelSize& model) {
-      oldest_first.push_back(model);
-      total_bytes += model.bytes;
-    }));
-    for (const ModelSize& model : oldest_first) {
-      if (total_bytes <= budget_bytes || collected.model_count == most) break;
-      if (model.pinned || model.digest == settings.spared || InMemory(model.digest)) continue;
-      if (!settings.dry_run) RETURN_IF_ERROR(DeleteModelRows(connection, model.digest));
-      total_bytes -= model.bytes;
-      collected = {collected.model_count + 1, collected.bytes + model.bytes};
-    }
-    return absl::OkStatus();
-  };
-  RETURN_IF_ERROR(database_->WriteToFree(collect));
-  const MutexLock lock(&cache_mutex_);
-  std::erase_if(sounded_, [&](const auto& entry) {
-    const auto same = stored.find(entry.first);
-    return same != stored.end() && same->second == entry.second;
-  });
-  return collected;
 }
 
 }  // namespace carillon

@@ -19,6 +19,7 @@
 #include "carillon/v1/material.pb.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "server/base/clock.h"
+#include "server/base/event.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/modal_model.h"
 
@@ -87,6 +88,9 @@ struct CollectSettings {
   /// Digest of a model that was just stored. It is kept until a newer model needs the space.
   std::string spared{};
   bool dry_run = false;  ///< only counts what would be deleted
+  /// Called for each model that was deleted, also if a later deletion fails.
+  std::function<void(const std::string& digest, uint64_t bytes)> on_deleted = [](const std::string&,
+                                                                                 uint64_t) {};
 };
 
 /// The largest size of all stored models together.
@@ -94,6 +98,8 @@ struct ModelBudget {
   uint64_t bytes = 0;  ///< of the arrays of all models; 0 means no limit
   /// Takes log lines about garbage collections. Any thread may call it.
   std::function<void(const std::string& line)> log = [](const std::string&) {};
+  /// Takes the deletions of models.
+  EventSink log_event = [](const Event&) {};
 };
 
 struct ModelPage {
@@ -246,6 +252,8 @@ class ModelStore {
   /// Deletes at most `most` models in one transaction.
   absl::StatusOr<Collected> CollectSome(uint64_t budget_bytes, const CollectSettings& settings,
                                         size_t most);
+  /// Deletes models until the others keep to the budget, and logs that. Spares `newest`.
+  void CollectBeyondBudget(const std::string& newest);
   absl::StatusOr<ModelSummary> Store(absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
                                      ModelSummary named);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);

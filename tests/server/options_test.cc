@@ -87,6 +87,9 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("scene_grace = -1\n", "--scene-grace");
   expect("client_share = 0\n", "--client-share");
   expect("metrics = \"9464\"\n", "--metrics");
+  expect("log_level = \"loud\"\n",
+         "--log-level is \"loud\"; it must be debug, info, warning or error");
+  expect("log_level = \"off\"\n", "--log-level");
   for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
     expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), "--slurm-upload");
   }
@@ -95,6 +98,12 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
 TEST(Options, AFileThatIsNotThereIsRefused) {
   EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: "));
+}
+
+TEST_F(OptionsFile, TheLogLevelIsInfoUnlessAnotherIsNamed) {
+  EXPECT_EQ(Read({})->options.log_level, "info");
+  EXPECT_EQ(Read({"--config", Write("log_level = \"debug\"\n")})->options.log_level, "debug");
+  EXPECT_EQ(Read({"--log-level", "error"})->options.log_level, "error");
 }
 
 TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {

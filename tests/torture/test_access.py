@@ -116,7 +116,8 @@ class AccessTest(unittest.TestCase):
     def logged(self, pattern):
         """How many lines of the log match, with those that were counted instead."""
         log = (self.folder / "log").read_text()
-        return len(re.findall(pattern, log)) + sum(map(int, re.findall(r"(\d+) more lines about refused access", log)))
+        counted = re.findall(r"(\d+) more lines about (?:refused access|gRPC)", log)
+        return len(re.findall(pattern, log)) + sum(map(int, counted))
 
     def test_every_method_needs_the_role_that_the_page_names(self):
         self.serve()
@@ -164,7 +165,7 @@ class AccessTest(unittest.TestCase):
             self.attack("wrong token", TIMES, lambda: self.outcome(channel, create, "guess"))
             self.assertEqual(self.outcome(channel, delete, token_of("strike"), remove)[0], grpc.StatusCode.OK)
         self.daemon.stop()
-        self.assertEqual(self.logged("a call from ipv4:127.0.0.1:[0-9]+ was refused"), self.attempts)
+        self.assertEqual(self.logged("a call of /[^ ]+ from ipv4:127.0.0.1:[0-9]+ was refused"), self.attempts)
 
     def test_a_scene_alone_is_heard_by_its_owner_and_administrators_only(self):
         self.write_access(line_of("band", "strike,listen"), line_of("rival", "strike,listen"),
@@ -204,7 +205,7 @@ class AccessTest(unittest.TestCase):
         common = self.authority.issue("common", alternative=None)
         self.assertEqual(listen_with(common)[0], grpc.StatusCode.OK)
         self.daemon.stop()
-        lines = self.logged("(gRPC: .*[Hh]andshake|a call from ipv4:127.0.0.1:[0-9]+ was refused)")
+        lines = self.logged("(gRPC: .*[Hh]andshake|a call of /[^ ]+ from ipv4:127.0.0.1:[0-9]+ was refused)")
         self.assertGreaterEqual(lines, handshakes + TIMES)
 
     def test_guessing_is_slowed_and_those_who_were_let_in_before_do_not_notice(self):

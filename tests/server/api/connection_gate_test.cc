@@ -22,8 +22,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "server/api/limited_log.h"
 #include "server/base/clock.h"
+#include "server/base/limited_log.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {

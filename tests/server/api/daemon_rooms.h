@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,20 +23,24 @@ struct DaemonRooms {
     settings.addresses = {address};
     settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
     settings.version = "test";
-    server = *ApiServer::Start(settings, {.database = *database,
-                                          .decompositions = *queue,
-                                          .runs = runs,
-                                          .scenes = scenes,
-                                          .output = *output,
-                                          .clock = clock,
-                                          .log = [this](const std::string& line) { Note(line); }});
+    server =
+        *ApiServer::Start(settings, {.database = *database,
+                                     .decompositions = *queue,
+                                     .runs = runs,
+                                     .scenes = scenes,
+                                     .output = *output,
+                                     .clock = clock,
+                                     .log = [this](const std::string& line) { Note(line); },
+                                     .log_event = [this](const Event& event) { Note(event); },
+                                     .can_decompose = [this] { return can_decompose.load(); }});
   }
 
   std::unique_ptr<DecompositionQueue> MakeQueue() {
     LocalExecutorOptions options;
     options.program = "/bin/false";
     options.directory = folder / "work";
-    return *DecompositionQueue::Make(*database, *MakeLocalExecutor(options, clock), clock);
+    return *DecompositionQueue::Make(*database, *MakeLocalExecutor(options, clock), clock,
+                                     {.log_event = [this](const Event& event) { Note(event); }});
   }
 
   void Note(const std::string& line) {
@@ -43,8 +48,15 @@ struct DaemonRooms {
     log += line + "\n";
   }
 
+  void Note(const Event& event) {
+    const MutexLock lock(&log_mutex);
+    events.push_back(event.ToLine());
+  }
+
   Mutex log_mutex;
-  std::string log;  ///< the warnings so far, a line each
+  std::string log;                  ///< the warnings so far, a line each
+  std::vector<std::string> events;  ///< the lines of the events so far
+  std::atomic<bool> can_decompose{true};
   TemporaryFolder folder;
   std::string address = "unix:" + (folder / "socket").string();
   SystemClock clock;

@@ -158,6 +158,13 @@ class ServedDaemon : public testing::Test {
     const MutexLock lock(&rooms_.log_mutex);
     return rooms_.log;
   }
+  /// The lines of the events so far.
+  std::vector<std::string> events() {
+    const MutexLock lock(&rooms_.log_mutex);
+    return rooms_.events;
+  }
+  /// Sets whether the program that computes decompositions is there.
+  void SetCanDecompose(bool can) { rooms_.can_decompose = can; }
 
  private:
   DaemonRooms rooms_;

@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <set>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/sha256.h"
@@ -372,6 +375,34 @@ TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   ASSERT_TRUE(import->Finish().ok());
   EXPECT_TRUE(absl::IsNotFound(database_->models().Find(a_).status()));
   EXPECT_TRUE(database_->models().Find(b_).ok());
+}
+
+TEST_F(ModeDatabaseTest, EachModelThatTheBudgetDeletesIsNamedInTheLog) {
+  std::vector<std::string> lines;
+  database_->models().KeepWithin(
+      {.bytes = 1, .log_event = [&](const Event& event) { lines.push_back(event.ToLine()); }});
+  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
+  const uint64_t bytes = database_->models().Summary(a_)->stored_bytes;
+  EXPECT_THAT(lines, testing::IsEmpty());
+  ASSERT_TRUE(Put(b_, SampleModel(10, 100)).ok());
+  EXPECT_THAT(
+      lines,
+      testing::ElementsAre(
+          absl::StrCat("model_deleted model=modalModels/", a_, " bytes=", bytes, " cause=budget"),
+          absl::StrCat("models_collected count=1 bytes=", bytes, " cause=budget budget_bytes=1")));
+}
+
+TEST_F(ModeDatabaseTest, EveryModelOfACollectionInManyTransactionsIsTold) {
+  constexpr int kModelCount = 20;  // more than one transaction deletes
+  for (int i = 0; i < kModelCount; ++i) {
+    ASSERT_TRUE(Put(Sha256Hex(absl::StrCat(i)), SampleModel(3, 10)).ok());
+  }
+  std::set<std::string> deleted;
+  const auto note = [&](const std::string& digest, uint64_t) { deleted.insert(digest); };
+  ASSERT_TRUE(database_->models().Collect(0, {.dry_run = true, .on_deleted = note}).ok());
+  EXPECT_THAT(deleted, testing::IsEmpty());
+  ASSERT_TRUE(database_->models().Collect(0, {.on_deleted = note}).ok());
+  EXPECT_THAT(deleted, testing::SizeIs(kModelCount));
 }
 
 /// A clock that stands where it is set.

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/limited_log.h"
+#include "server/base/limited_log.h"
 
 #include <algorithm>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 
 namespace carillon {
 namespace {
@@ -47,7 +48,9 @@ void LimitedLog::Warn(absl::string_view line) {
     return;
   }
   SayWhatWasLeftOut();
-  sink_(absl::CHexEscape(line.substr(0, kLongestLine)));
+  // No quotes enclose the line, so that its quotes need no escape.
+  sink_(absl::StrReplaceAll(absl::CHexEscape(line.substr(0, kLongestLine)),
+                            {{"\\'", "'"}, {"\\\"", "\""}}));
 }
 
 void LimitedLog::SayWhatWasLeftOut() {

@@ -42,6 +42,9 @@ class LimitedLog {
  public:
   using Sink = std::function<void(const std::string&)>;
 
+  /// Number of lines that are taken at once.
+  static constexpr double kMostAtOnce = 20;
+
   /// `subject` tells what the lines are about. `clock` must outlive the log.
   LimitedLog(const Clock& clock, std::string subject, Sink sink)
       : clock_(clock), subject_(std::move(subject)), sink_(std::move(sink)) {}
@@ -60,7 +63,7 @@ class LimitedLog {
   const std::string subject_;
   const Sink sink_;
   Mutex mutex_;
-  Allowance lines_ ABSL_GUARDED_BY(mutex_){20};
+  Allowance lines_ ABSL_GUARDED_BY(mutex_){kMostAtOnce};
   uint64_t left_out_count_ ABSL_GUARDED_BY(mutex_) = 0;
 };
 
