@@ -60,6 +60,12 @@ class Client {
   /// Returns the version, the age, the limits and the features of the daemon. Needs no token.
   virtual absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const;
 
+  /// Returns whether a service, such as "carillon.v1.AudioService", is SERVING after the daemon's
+  /// health (grpc.health.v1); docs/operations.md has the services and what keeps each from serving.
+  /// The empty name is the whole daemon. Needs no token. Returns DEADLINE_EXCEEDED (SERVER_TIMEOUT)
+  /// after 10 seconds.
+  virtual absl::StatusOr<bool> IsServing(const std::string& service) const;
+
   // Modal models.
 
   /// Stores the bytes of a mesh file and returns their digest, which CreateModalModel takes.
