@@ -45,6 +45,7 @@ void CheckProcess(const Program& program, Findings& findings) {
   }
   const absl::StatusOr<pid_t> process = ProcessAt(std::string(path));
   if (!process.ok()) return findings.Bad("socket", Text(process.status()));
+  findings.Good("socket", absl::StrCat(ProcessName(*process), " listens at ", path));
   const std::optional<bool> realtime = HasRealtimeThread(*process);
   if (!realtime) {
     findings.Unknown("real time", "this user cannot see the daemon's threads");
@@ -200,12 +201,18 @@ void CheckSlurm(const client::Client& daemon, Findings& findings) {
                    "cluster: see that slurmctld runs");
 }
 
-void CheckTls(const Program& program, Findings& findings) {
+void CheckTls(const Program& program, const client::Client& daemon, Findings& findings) {
   if (!program.tls_roots_file.empty() && !absl::StartsWith(program.server, "unix:")) {
     return findings.Good(
         "tls", absl::StrCat("the daemon's certificate is vouched for by ", program.tls_roots_file));
   }
-  if (IsOnThisMachine(program.server)) return findings.Good("tls", "not needed on this machine");
+  if (IsOnThisMachine(program.server)) {
+    const auto info = daemon.GetServerInfo();
+    const bool serves_tls = info.ok() && info->certificate_end_unix_s() != 0;
+    return findings.Good(
+        "tls", serves_tls ? "the daemon serves TLS over TCP, and its Unix socket needs none"
+                          : "not needed, because only this machine reaches the daemon");
+  }
   findings.Bad("tls",
                "without --tls-roots the network reads along, and tokens are sent for all to see: "
                "name the certificate that vouches for the daemon");
@@ -253,7 +260,7 @@ void CheckDaemon(const Program& program, Findings& findings) {
   CheckWorkers(health, findings);
   CheckJobs(*daemon, findings);
   CheckSlurm(*daemon, findings);
-  CheckTls(program, findings);
+  CheckTls(program, *daemon, findings);
   CheckCertificates(*daemon, findings);
 }
 

@@ -57,8 +57,10 @@ class HealthTest(unittest.TestCase):
         told = json.loads(self.daemon.command("doctor", "--json", check=False).stdout)
         return {found["subject"]: found["text"] for found in told["findings"] if found["verdict"] == verdict}
 
-    def test_the_doctor_finds_that_every_service_serves(self):
+    def test_the_doctor_names_the_process_and_finds_that_every_service_serves(self):
         found = self.findings("OK")
+        process = f"carillond (process {self.daemon.process.pid})"
+        self.assertEqual(found["socket"], f"{process} listens at {self.folder}/socket")
         self.assertEqual(found["health"], "every service is SERVING")
 
     def test_health_prints_each_service_and_succeeds_only_if_all_serve(self):
