@@ -269,8 +269,10 @@ class Client {
   /// Returns the size and the contents of the daemon's database.
   virtual absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
 
-  /// Writes a consistent copy of the daemon's database to a file.
-  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), DATA_LOSS.
+  /// Writes a consistent copy of the daemon's database to a file. A file that has the name already
+  /// is replaced once the copy is complete; after an error it stays as it was.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION (OUTPUT_IN_USE: the file
+  /// belongs to the database of a daemon), DATA_LOSS.
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 
   /// Deletes the models that sounded least recently until the others fit into the request's budget.
