@@ -97,9 +97,8 @@ std::string ProcessName(pid_t process) {
   // The kernel gives no number for a process of another PID namespace.
   if (process == 0) return "a process of another PID namespace";
   const std::string name = Read(absl::StrCat("/proc/", process, "/comm"));
-  const std::string number = absl::StrCat("process ", process);
-  if (name.empty()) return number;
-  return absl::StrCat(absl::StripSuffix(name, "\n"), " (", number, ")");
+  if (name.empty()) return absl::StrCat("process ", process);
+  return absl::StrCat(absl::StripSuffix(name, "\n"), " (process ", process, ")");
 }
 
 bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {

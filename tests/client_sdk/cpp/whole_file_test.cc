@@ -20,8 +20,8 @@ using testing::HasSubstr;
 
 class WholeFileTest : public testing::Test {
  protected:
-  WholeFileTest() { fs::create_directory(folder_); }
-  ~WholeFileTest() override { fs::remove_all(folder_); }
+  void SetUp() override { fs::create_directory(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
 
   static void Put(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
 
