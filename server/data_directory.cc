@@ -2,8 +2,10 @@
 #include "server/data_directory.h"
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -46,7 +48,29 @@ bool LockWithinASecond(int folder, int file) {
   return true;
 }
 
+/// Whether the path lies in a file system of the kernel, in which nobody can make a folder, though
+/// root seems to be allowed to.
+bool IsOfKernel(const std::filesystem::path& path) {
+  struct statfs found {};
+  return statfs(path.c_str(), &found) == 0 &&
+         (found.f_type == PROC_SUPER_MAGIC || found.f_type == SYSFS_MAGIC);
+}
+
 }  // namespace
+
+absl::Status DataDirectory::Check(const std::filesystem::path& path) {
+  // The folder that is there, or in which Open makes the missing ones.
+  std::filesystem::path folder = std::filesystem::absolute(path);
+  std::error_code ignored;
+  while (!std::filesystem::exists(folder, ignored) && folder.has_relative_path()) {
+    folder = folder.parent_path();
+  }
+  if (!std::filesystem::is_directory(folder, ignored)) return Unusable(path, ENOTDIR);
+  if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
+    return Unusable(path, errno);
+  }
+  return IsOfKernel(folder) ? Unusable(path, EROFS) : absl::OkStatus();
+}
 
 absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& path) {
   std::error_code error;

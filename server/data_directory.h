@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
 namespace carillon {
@@ -16,6 +17,10 @@ class DataDirectory {
  public:
   static constexpr char kDatabaseName[] = "carillon.db";
 
+  /// Checks whether Open could use or create the folder, without locking or creating anything.
+  /// Errors: FailedPrecondition (DATA_DIRECTORY_UNUSABLE).
+  static absl::Status Check(const std::filesystem::path& path);
+
   /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,
   /// unless it exists. Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
@@ -24,8 +29,10 @@ class DataDirectory {
   DataDirectory& operator=(DataDirectory&&) = delete;
 
   std::filesystem::path database_file() const { return path_ / kDatabaseName; }
-  /// The folder for the files of running decompositions.
-  std::filesystem::path work_directory() const { return path_ / "work"; }
+  /// The folder for the files of running decompositions in the data folder `path`.
+  static std::filesystem::path WorkDirectory(const std::filesystem::path& path) {
+    return path / "work";
+  }
 
  private:
   DataDirectory(std::filesystem::path path, int folder, int file);

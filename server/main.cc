@@ -39,6 +39,7 @@
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/mode_database.h"
 #include "server/options.h"
+#include "server/room_settings.h"
 #include "server/scene/scene_registry.h"
 #include "server/stop_signals.h"
 #include "server/watchdog.h"
@@ -92,28 +93,10 @@ void LogOutput(const LiveOutput& output) {
                output.format().sample_rate_hz, state.latency_s * 1000);
 }
 
-std::chrono::milliseconds Milliseconds(double seconds) {
-  return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
-}
-
-absl::StatusOr<std::unique_ptr<Executor>> MakeLocal(const Options& options,
-                                                    const DataDirectory& directory,
-                                                    const Clock& clock) {
-  LocalExecutorOptions executor_options;
-  executor_options.program = options.precompute_program;
-  executor_options.directory = directory.work_directory();
-  executor_options.worker_count = options.worker_count;
-  executor_options.memory_budget_bytes = static_cast<uint64_t>(options.memory_budget_mib) << 20U;
-  executor_options.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
-  executor_options.time_limit = Milliseconds(options.job_time_s);
-  executor_options.stall_limit = Milliseconds(options.stall_time_s);
-  return MakeLocalExecutor(executor_options, clock);
-}
-
 absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
                                                        const DataDirectory& directory,
                                                        const Clock& clock, RemoteRuns& runs) {
-  if (options.executor == "local") return MakeLocal(options, directory, clock);
+  if (options.executor == "local") return MakeLocalExecutor(LocalExecutorOptionsOf(options), clock);
   SlurmExecutorOptions slurm;
   slurm.program = options.precompute_program;
   slurm.directory = options.slurm_directory;
@@ -126,8 +109,7 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
   if (options.job_memory_mib > 0) {
     slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
   }
-  slurm.time_limit =
-      std::chrono::duration_cast<std::chrono::seconds>(Milliseconds(options.job_time_s));
+  slurm.time_limit = std::chrono::seconds(static_cast<int64_t>(options.job_time_s));
   return MakeSlurmExecutor(slurm, runs);
 }
 
@@ -146,31 +128,6 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
        .transfers = options.transfers,
        .log = LogWarning,
        .log_event = LogEvent});
-}
-
-OutputSettings OutputSettingsOf(const Options& options) {
-  return {.format = {.sample_rate_hz = options.sample_rate_hz,
-                     .block_frame_count = options.block_frame_count,
-                     .channel_count = options.channel_count},
-          .look_ahead_block_count = options.look_ahead_block_count,
-          .device = options.audio_device,
-          .device_program = options.audio_program,
-          .gain = options.gain,
-          .full_scale_pa = options.full_scale_pa};
-}
-
-ApiSettings ApiSettingsOf(const Options& options) {
-  return {.addresses = options.addresses,
-          .tls = {.certificate = options.tls_certificate_file,
-                  .key = options.tls_key_file,
-                  .client_roots = options.tls_client_roots_file},
-          .access_file = options.access_file,
-          .head_file = options.head_file,
-          .version = kVersion,
-          .scene_grace_s = options.scene_grace_s,
-          .client_share = options.client_share,
-          .precompute_program = options.precompute_program,
-          .slurm = options.executor == "slurm"};
 }
 
 /// The present settings with those of `read` that can change while the daemon runs.
@@ -240,10 +197,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 
 /// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
 /// destroyed before them.
-absl::Status Run(Options options, const ReadOptions& read_options) {
-  BlockSignals();
-  ApiServer::KeepLibrary();
-  const StopGuard guard(LogInfo);
+absl::Status Run(Options options, const ReadOptions& read_options, const StopGuard& guard) {
   RETURN_IF_ERROR(CheckLimits());
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
@@ -310,6 +264,29 @@ absl::Status Report(const std::filesystem::path& file, const std::filesystem::pa
   return absl::OkStatus();
 }
 
+/// Logs an error, and returns the exit status that belongs to it.
+int Fail(const absl::Status& status, int exit_status) {
+  spdlog::error("{}", std::string(status.message()));
+  return exit_status;
+}
+
+/// Runs the daemon until it is stopped. Returns the exit status.
+int RunDaemon(const Options& options, const ReadOptions& read_options) {
+  BlockSignals();
+  ApiServer::KeepLibrary();
+  const StopGuard guard(LogInfo);
+  if (const absl::Status wrong = CheckRooms(options); !wrong.ok()) return Fail(wrong, kWrongUsage);
+  const absl::Status status = Run(options, read_options, guard);
+  return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
+}
+
+/// Checks the settings without running the daemon. Returns the exit status.
+int CheckOnly(const Options& options) {
+  if (const absl::Status wrong = CheckRooms(options); !wrong.ok()) return Fail(wrong, kWrongUsage);
+  std::cout << "the configuration is valid" << std::endl;
+  return EXIT_SUCCESS;
+}
+
 /// Runs `carillond db check|repair|restore`.
 absl::Status RunDatabaseCommand(const CommandLine& command) {
   const std::filesystem::path folder = command.options.data_directory;
@@ -345,23 +322,17 @@ int Main(int argc, const char* const* argv) {
   SetUpLog();
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();
-  if (command.ok() && !command->run) return command->exit_status;
-  if (command.ok() && command->only_print) {
+  if (!command.ok()) return Fail(command.status(), kWrongUsage);
+  if (!command->run) return command->exit_status;
+  if (command->only_print) {
     std::cout << PrintConfiguration(command->options);
     return EXIT_SUCCESS;
   }
-  if (command.ok() && command->only_check) {
-    std::cout << "the configuration is valid" << std::endl;
-    return EXIT_SUCCESS;
-  }
-  if (command.ok()) SetLogLevel(command->options.log_level);
-  const absl::Status status = !command.ok() ? command.status()
-                              : command->database_command.empty()
-                                  ? Run(command->options, read_options)
-                                  : RunDatabaseCommand(*command);
-  if (status.ok()) return 0;
-  spdlog::error("{}", std::string(status.message()));
-  return command.ok() ? EXIT_FAILURE : kWrongUsage;
+  SetLogLevel(command->options.log_level);
+  if (command->only_check) return CheckOnly(command->options);
+  if (command->database_command.empty()) return RunDaemon(command->options, read_options);
+  const absl::Status status = RunDatabaseCommand(*command);
+  return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
 }
 
 }  // namespace

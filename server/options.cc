@@ -8,23 +8,21 @@
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
+#include <system_error>
 #include <type_traits>
 
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/manual_page.h"
 #include "proto/cpp/server_address.h"
 #include "proto/cpp/status_macros.h"
+#include "server/setting_rules.h"
 
 namespace carillon {
 namespace {
-
-absl::Status InvalidConfiguration(absl::string_view message) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION", message);
-}
 
 std::string Environment(const char* name) {
   const char* value = std::getenv(name);
@@ -126,102 +124,63 @@ absl::Status ReadValue(absl::string_view key, const toml::node& node,
   return absl::OkStatus();
 }
 
+/// Checks one setting, which its user wrote as `name`.
+template <typename T>
+absl::Status CheckSetting(absl::string_view key, absl::string_view name, const T& setting) {
+  if constexpr (std::is_same_v<T, std::string>) {
+    return CheckText(key, name, setting);
+  } else if constexpr (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) {
+    return CheckNumber(key, name, static_cast<double>(setting));
+  } else {
+    return absl::OkStatus();
+  }
+}
+
 absl::Status ReadKey(const std::string& key, const toml::node& node, Options& options) {
   absl::Status status = InvalidConfiguration(
       absl::StrCat("there is no setting \"", key,
                    "\"; a setting has the name of its flag, with _ in place of -"));
   VisitSettings(options, [&](absl::string_view name, auto& target) {
-    if (name == key) status = ReadValue(key, node, target);
+    if (name != key) return;
+    status = ReadValue(key, node, target);
+    if (status.ok()) status = CheckSetting(key, key, target);
   });
   return status;
 }
 
+/// Returns a mistake in a file. `line` is zero if the mistake is not in one line.
+absl::Status MistakeIn(const std::string& path, uint32_t line, absl::string_view what) {
+  const std::string place = line == 0 ? path : absl::StrCat(path, " line ", line);
+  return InvalidConfiguration(absl::StrCat(place, ": ", what));
+}
+
 absl::Status ReadFile(const std::string& path, Options& options) {
+  // A folder can be opened, and would be an empty file.
+  if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) {
+    return MistakeIn(path, 0, "it is a folder; name a TOML file");
+  }
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
       const absl::Status status = ReadKey(std::string(key.str()), node, options);
       if (status.ok()) continue;
-      return InvalidConfiguration(absl::StrCat(path, " line ", key.source().begin.line, ": ",
-                                               ToErrorInfo(status).message()));
+      return MistakeIn(path, key.source().begin.line, ToErrorInfo(status).message());
     }
   } catch (const toml::parse_error& error) {
-    return InvalidConfiguration(
-        absl::StrCat(path, " line ", error.source().begin.line, ": ",
-                     absl::string_view(error.description().data(), error.description().size())));
-  }
-  return absl::OkStatus();
-}
-
-constexpr const char* kLogLevels[] = {"debug", "info", "warning", "error"};
-constexpr int64_t kMostMib = 1LL << 40;
-constexpr double kMostSeconds = 1e8;
-
-template <typename T>
-absl::Status CheckRange(absl::string_view what, T value, std::type_identity_t<T> least,
-                        std::type_identity_t<T> most) {
-  if (value >= least && value <= most) return absl::OkStatus();
-  return InvalidConfiguration(
-      absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
-}
-
-bool IsHostAndPort(absl::string_view text) {
-  const size_t colon = text.rfind(':');
-  int port = 0;
-  return colon != absl::string_view::npos && colon > 0 &&
-         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
-}
-
-absl::Status CheckNumbers(const Options& options) {
-  for (const absl::Status& status :
-       {CheckRange("--sample-rate", options.sample_rate_hz, 8000, 192000),
-        CheckRange("--channels", options.channel_count, 1, 2),
-        CheckRange("--gain", options.gain, 0, 1000),
-        CheckRange("--full-scale-pa", options.full_scale_pa, kLeastFullScalePa, kMostFullScalePa),
-        CheckRange("--block-frames", options.block_frame_count, 16, 256),
-        CheckRange("--look-ahead-blocks", options.look_ahead_block_count, 2, 64),
-        CheckRange("--workers", options.worker_count, 0, 1024),
-        CheckRange("--memory-budget-mib", options.memory_budget_mib, 0, kMostMib),
-        CheckRange("--job-memory-mib", options.job_memory_mib, 0, kMostMib),
-        CheckRange("--job-time", options.job_time_s, 0.1, kMostSeconds),
-        CheckRange("--stall-time", options.stall_time_s, 0.1, kMostSeconds),
-        CheckRange("--scene-grace", options.scene_grace_s, 0, kMostSeconds),
-        CheckRange("--client-share", options.client_share, 0.001, 1),
-        CheckRange("--queue-limit", options.queue_limit, 1, 1'000'000),
-        CheckRange("--model-budget-mib", options.model_budget_mib, 0, kMostMib)}) {
-    if (!status.ok()) return status;
+    return MistakeIn(path, error.source().begin.line,
+                     {error.description().data(), error.description().size()});
   }
   return absl::OkStatus();
 }
 
 absl::Status Check(const Options& options) {
-  RETURN_IF_ERROR(CheckNumbers(options));
-  if (options.executor != "local" && options.executor != "slurm") {
-    return InvalidConfiguration(
-        absl::StrCat("--executor is \"", options.executor, "\"; it must be local or slurm"));
-  }
-  const auto is_level = [&](absl::string_view name) { return options.log_level == name; };
-  if (!std::ranges::any_of(kLogLevels, is_level)) {
-    return InvalidConfiguration(absl::StrCat("--log-level is \"", options.log_level,
-                                             "\"; it must be debug, info, warning or error"));
-  }
-  if (options.data_directory.empty()) return InvalidConfiguration("--data-dir names no folder");
-  if (!options.slurm_upload.empty() && !IsHostAndPort(options.slurm_upload)) {
-    return InvalidConfiguration(absl::StrCat("--slurm-upload is \"", options.slurm_upload,
-                                             "\"; it must be HOST:PORT, as the nodes reach it"));
-  }
-  if (!options.metrics_address.empty() && !IsHostAndPort(options.metrics_address)) {
-    return InvalidConfiguration(absl::StrCat("--metrics is \"", options.metrics_address,
-                                             "\"; it must be HOST:PORT, as 127.0.0.1:9464"));
-  }
-  if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
-  if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
-    return InvalidConfiguration("--tls-certificate and --tls-key must be given together");
-  }
-  if (options.tls_certificate_file.empty() && !options.tls_client_roots_file.empty()) {
-    return InvalidConfiguration("--tls-client-roots needs --tls-certificate and --tls-key");
-  }
-  return absl::OkStatus();
+  absl::Status status = absl::OkStatus();
+  VisitSettings(options, [&status](absl::string_view key, const auto& setting) {
+    const std::string flag = absl::StrCat("--", absl::StrReplaceAll(key, {{"_", "-"}}));
+    if (status.ok()) status = CheckSetting(key, flag, setting);
+  });
+  RETURN_IF_ERROR(status);
+  return CheckTogether(options);
 }
 
 void AddFlags(CLI::App& app, Options& options) {

@@ -143,6 +143,9 @@ struct RenderOptions {
 /// error.
 absl::Status ShowInfo(const client::Client& daemon, const std::string& server, bool json);
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
+/// Shows which services are SERVING. Errors: those of Client::IsServing, FailedPrecondition
+/// (NOT_SERVING), if one of them is not.
+absl::Status ShowHealth(const client::Client& daemon, bool json);
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
 absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,

@@ -19,6 +19,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -90,6 +91,14 @@ absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path) {
       absl::StrCat(error == EAGAIN ? "the process takes no connection at " : "nobody listens at ",
                    socket_path, " (", std::generic_category().message(error),
                    "): ", WhatToDo(error)));
+}
+
+std::string ProcessName(pid_t process) {
+  // The kernel gives no number for a process of another PID namespace.
+  if (process == 0) return "a process of another PID namespace";
+  const std::string name = Read(absl::StrCat("/proc/", process, "/comm"));
+  if (name.empty()) return absl::StrCat("process ", process);
+  return absl::StrCat(absl::StripSuffix(name, "\n"), " (process ", process, ")");
 }
 
 bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {

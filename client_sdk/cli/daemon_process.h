@@ -16,6 +16,9 @@ namespace carillon::cli {
 /// no process listens there or this user may not connect.
 absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
 
+/// Returns a process as "carillond (process 123)", as far as this user can see it.
+std::string ProcessName(pid_t process);
+
 /// Returns whether the process at a Unix socket takes no connection, or sends nothing on one within
 /// the time. A daemon sends its HTTP/2 settings at once. If no process listens there, the result is
 /// false.

@@ -19,6 +19,7 @@
 #include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "client_sdk/cli/findings.h"
+#include "client_sdk/cli/health.h"
 #include "client_sdk/cli/output.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
@@ -44,6 +45,7 @@ void CheckProcess(const Program& program, Findings& findings) {
   }
   const absl::StatusOr<pid_t> process = ProcessAt(std::string(path));
   if (!process.ok()) return findings.Bad("socket", Text(process.status()));
+  findings.Good("socket", absl::StrCat(ProcessName(*process), " listens at ", path));
   const std::optional<bool> realtime = HasRealtimeThread(*process);
   if (!realtime) {
     findings.Unknown("real time", "this user cannot see the daemon's threads");
@@ -72,10 +74,33 @@ uint64_t FramesLostNow(const client::Client& daemon, const v1::GetMixerResponse&
   return after.ok() ? after->lost_frame_count() - before.lost_frame_count() : 0;
 }
 
-void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
+/// Returns the health of the daemon. A daemon that does not tell it counts as one that serves.
+Health CheckHealth(const client::Client& daemon, Findings& findings) {
+  const absl::StatusOr<Health> health = ReadHealth(daemon);
+  if (!health.ok()) {
+    findings.Unknown("health", Text(health.status()));
+    return {.daemon = true, .audio = true, .models = true, .decompositions = true};
+  }
+  const std::vector<ServiceHealth> services = ServicesOf(*health);
+  if (!health->daemon) {
+    findings.Bad("health",
+                 "carillond is NOT_SERVING, because it is stopping: start it again if nobody else "
+                 "does");
+  } else if (std::ranges::all_of(services, &ServiceHealth::serves)) {
+    findings.Good("health", "every service is SERVING");
+  }
+  return *health;
+}
+
+void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer, bool serves,
                 Findings& findings) {
   if (!mixer.device_message().empty()) {
     findings.Bad("sound", absl::StrCat("plays on ", mixer.device(), ": ", mixer.device_message()));
+  } else if (!serves) {
+    findings.Bad("sound", absl::StrCat("carillon.v1.AudioService is NOT_SERVING, and plays on ",
+                                       mixer.device(),
+                                       ": the wanted device does not play or loses frames: see the "
+                                       "daemon's log, and the load below"));
   } else if (mixer.device() == "null") {
     findings.Unknown("sound", "plays on null, to nobody but `carillon listen`: see --audio-device");
   } else {
@@ -96,7 +121,15 @@ void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
   findings.Good("load", load);
 }
 
-void CheckDatabase(const client::Client& daemon, Findings& findings) {
+void CheckDatabase(const client::Client& daemon, bool serves, Findings& findings) {
+  if (!serves) {
+    return findings.Bad(
+        "database",
+        "carillon.v1.ModalModelService is NOT_SERVING, because the database's file or its -wal "
+        "file was removed, replaced or truncated (the daemon's log says which): every change is "
+        "refused until you stop the daemon, put the file back or run `carillond db restore`, and "
+        "start the daemon again");
+  }
   const auto stats = daemon.GetDatabaseStats();
   if (absl::IsPermissionDenied(stats.status()) || absl::IsUnauthenticated(stats.status())) {
     return findings.Unknown("database", Text(stats.status()));
@@ -121,16 +154,33 @@ bool Succeeds(const std::vector<std::string>& command) {
   return end.exited && end.status == 0;
 }
 
-void CheckWorkers(const client::Client& daemon, Findings& findings) {
+void CheckWorkers(const Health& health, Findings& findings) {
+  if (!health.decompositions) {
+    return findings.Bad(
+        "workers",
+        absl::StrCat("carillon.v1.DecompositionService is NOT_SERVING, because ",
+                     health.models
+                         ? "the daemon cannot execute its carillon-precompute: put that program "
+                           "back, or give the path of another with --precompute and restart the "
+                           "daemon (`carillond --print-config` prints the path in force)"
+                         : "a model has no place in the database: see the database above"));
+  }
   const std::filesystem::path beside =
       std::filesystem::read_symlink("/proc/self/exe").replace_filename("carillon-precompute");
   if (Succeeds({beside, "--version"}) || Succeeds({"carillon-precompute", "--version"})) {
-    findings.Good("workers", "carillon-precompute runs");
-  } else {
-    findings.Bad("workers",
-                 absl::StrCat("carillon-precompute does not run, neither as ", beside.string(),
-                              " nor from PATH: install it, or models cannot be computed"));
+    return findings.Good("workers",
+                         "the daemon finds its carillon-precompute, and the installed one runs");
   }
+  // The daemon may have been given another one.
+  findings.Unknown("workers",
+                   absl::StrCat("the daemon finds its carillon-precompute, but none runs here, "
+                                "neither as ",
+                                beside.string(),
+                                " nor from PATH: if models cannot be computed, install it anew"));
+}
+
+/// Finds the newest job that failed because of its worker.
+void CheckJobs(const client::Client& daemon, Findings& findings) {
   const auto jobs = daemon.ListJobs();
   if (!jobs.ok()) return;
   for (const v1::Job& job : *jobs) {
@@ -151,12 +201,18 @@ void CheckSlurm(const client::Client& daemon, Findings& findings) {
                    "cluster: see that slurmctld runs");
 }
 
-void CheckTls(const Program& program, Findings& findings) {
+void CheckTls(const Program& program, const client::Client& daemon, Findings& findings) {
   if (!program.tls_roots_file.empty() && !absl::StartsWith(program.server, "unix:")) {
     return findings.Good(
         "tls", absl::StrCat("the daemon's certificate is vouched for by ", program.tls_roots_file));
   }
-  if (IsOnThisMachine(program.server)) return findings.Good("tls", "not needed on this machine");
+  if (IsOnThisMachine(program.server)) {
+    const auto info = daemon.GetServerInfo();
+    const bool serves_tls = info.ok() && info->certificate_end_unix_s() != 0;
+    return findings.Good(
+        "tls", serves_tls ? "the daemon serves TLS over TCP, and its Unix socket needs none"
+                          : "not needed, because only this machine reaches the daemon");
+  }
   findings.Bad("tls",
                "without --tls-roots the network reads along, and tokens are sent for all to see: "
                "name the certificate that vouches for the daemon");
@@ -198,11 +254,13 @@ void CheckDaemon(const Program& program, Findings& findings) {
   same ? findings.Good("daemon", version)
        : findings.Bad("daemon", absl::StrCat(version, ", but this is carillon ", CARILLON_VERSION,
                                              ": restart the daemon after an upgrade"));
-  CheckSound(*daemon, *mixer, findings);
-  CheckDatabase(*daemon, findings);
-  CheckWorkers(*daemon, findings);
+  const Health health = CheckHealth(*daemon, findings);
+  CheckSound(*daemon, *mixer, health.audio, findings);
+  CheckDatabase(*daemon, health.models, findings);
+  CheckWorkers(health, findings);
+  CheckJobs(*daemon, findings);
   CheckSlurm(*daemon, findings);
-  CheckTls(program, findings);
+  CheckTls(program, *daemon, findings);
   CheckCertificates(*daemon, findings);
 }
 

@@ -43,6 +43,12 @@ void AddStatus(CLI::App& app, Program& program) {
       });
 }
 
+void AddHealth(CLI::App& app, Program& program) {
+  app.add_subcommand("health", "Show which services of the daemon are SERVING")->callback([&] {
+    program.command = [&] { return ShowHealth(*program.Daemon(), program.json); };
+  });
+}
+
 void AddInfo(CLI::App& app, Program& program) {
   app.add_subcommand("info", "Show the version, the limits and the features of the daemon")
       ->callback([&] {
@@ -271,6 +277,7 @@ void AddHelp(CLI::App& app, Program& program) {
 void AddCommands(CLI::App& app, Program& program) {
   AddInfo(app, program);
   AddStatus(app, program);
+  AddHealth(app, program);
   AddDoctor(app, program);
   AddDatabase(app, program);
   AddModel(app, program);

@@ -99,6 +99,12 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
   return addresses;
 }
 
+absl::Status CheckHead(HeadStore& heads, const ApiSettings& settings, uint32_t sample_rate_hz) {
+  // Without the setting, a scene that needs the usual head is refused when it asks for it.
+  if (settings.head_file.empty()) return absl::OkStatus();
+  return heads.Get(sample_rate_hz).status();
+}
+
 }  // namespace
 
 struct ApiServer::State {
@@ -314,14 +320,24 @@ void ApiServer::State::ShowDatabase(const absl::Status& state) {
   if (state.ok() && !stored) log("the database can be changed again");
 }
 
+absl::Status ApiServer::Check(const ApiSettings& settings, uint32_t sample_rate_hz) {
+  RETURN_IF_ERROR(ReadAccess(settings).status());
+  ASSIGN_OR_RETURN(const std::deque<ListenAddress> addresses, ParseAddresses(settings));
+  for (const ListenAddress& address : addresses) {
+    if (address.is_unix()) RETURN_IF_ERROR(CheckSocket(address.socket_path));
+  }
+  const bool serves_tls =
+      !settings.tls.certificate.empty() && !std::ranges::all_of(addresses, &ListenAddress::is_unix);
+  if (serves_tls) RETURN_IF_ERROR(ReadTlsFiles(settings.tls).status());
+  HeadStore heads(settings.head_file);
+  return CheckHead(heads, settings, sample_rate_hz);
+}
+
 absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& settings,
                                                             const ServedRooms& rooms) {
   ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
   auto state = std::make_unique<State>(settings, rooms, std::move(table));
-  if (!settings.head_file.empty()) {
-    const uint32_t rate_hz = rooms.output.format().sample_rate_hz;
-    RETURN_IF_ERROR(state->heads.Get(rate_hz).status());
-  }
+  RETURN_IF_ERROR(CheckHead(state->heads, settings, rooms.output.format().sample_rate_hz));
   RETURN_IF_ERROR(state->Listen(settings));
   rooms.output.ObserveDevice([&servers = *state->servers](bool plays) {
     servers.SetHealth(v1::AudioService::service_full_name(), plays);

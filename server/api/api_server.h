@@ -83,6 +83,11 @@ class ApiServer {
   /// last object is destroyed, and may wait 10 s for one that polls. A process calls it once.
   static void KeepLibrary();
 
+  /// Checks the settings by the rules of Start, without opening a socket or changing anything.
+  /// Errors: those of Start that do not depend on what other processes do, FailedPrecondition
+  /// (HEAD_UNUSABLE).
+  static absl::Status Check(const ApiSettings& settings, uint32_t sample_rate_hz);
+
   /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
   /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
   /// without TLS or without an access file, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE,

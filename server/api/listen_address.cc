@@ -74,6 +74,17 @@ absl::StatusOr<mode_t> SocketMode(const std::filesystem::path& folder) {
                               "one"));
 }
 
+/// Refuses a path at which something else than a socket lies.
+absl::Status CheckIsSocket(const std::string& path) {
+  struct stat status {};
+  if (lstat(path.c_str(), &status) != 0 || S_ISSOCK(status.st_mode)) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
+      absl::StrCat("\"", path, "\" is ",
+                   S_ISDIR(status.st_mode) ? "a folder" : "a file of another kind",
+                   ", not a socket, and stays as it is: choose another name with --listen"));
+}
+
 }  // namespace
 
 bool ListenAddress::is_local() const {
@@ -96,6 +107,14 @@ absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
   return address;
 }
 
+absl::Status CheckSocket(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  std::error_code ignored;
+  // PrepareSocket makes a folder that is missing.
+  if (std::filesystem::exists(folder, ignored)) RETURN_IF_ERROR(SocketMode(folder).status());
+  return CheckIsSocket(path);
+}
+
 absl::StatusOr<mode_t> PrepareSocket(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
   std::error_code error;
@@ -111,15 +130,7 @@ absl::StatusOr<mode_t> PrepareSocket(const std::string& path) {
                    absl::StrCat("a daemon serves unix:", path,
                                 " already; stop it or choose another --listen"));
   }
-  struct stat status {};
-  if (lstat(path.c_str(), &status) != 0) return mode;
-  if (!S_ISSOCK(status.st_mode)) {
-    return Refusal(
-        absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
-        absl::StrCat("\"", path, "\" is ",
-                     S_ISDIR(status.st_mode) ? "a folder" : "a file of another kind",
-                     ", not a socket, and stays as it is: choose another name with --listen"));
-  }
+  RETURN_IF_ERROR(CheckIsSocket(path));
   std::filesystem::remove(path, error);  // a daemon that was killed leaves its socket
   return mode;
 }

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 
@@ -27,6 +28,10 @@ struct ListenAddress {
 
 /// Parses an address. Errors: InvalidArgument (INVALID_ADDRESS).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
+
+/// Checks what PrepareSocket would find, without making or removing anything. Errors: those of
+/// PrepareSocket without ADDRESS_IN_USE.
+absl::Status CheckSocket(const std::string& path);
 
 /// Makes the folder of a Unix socket, for its owner only, unless it exists. Removes a socket that
 /// no running daemon serves. Returns the mode for the new socket, which is 0660 if only a group may

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
@@ -32,12 +33,6 @@ bool HoldsOther(const std::string& path) {
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
                                                             const DeviceFormat& format,
                                                             Clock& clock) {
-  if (HoldsOther(std::string(path))) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
-                   absl::StrCat("\"", path,
-                                "\" holds something other than a WAV sound, and stays as it is: "
-                                "name another file with --audio-device file:PATH"));
-  }
   ASSIGN_OR_RETURN(WavWriter made,
                    WavWriter::Make(std::string(path), format.sample_rate_hz, format.channel_count));
   auto writer = std::make_shared<WavWriter>(std::move(made));
@@ -52,24 +47,34 @@ std::unique_ptr<AudioDevice> OpenNullDevice(const DeviceFormat& format, Clock& c
   return std::make_unique<ClockedDevice>("null", format, clock, nullptr);
 }
 
+absl::Status CheckDevice(absl::string_view specification) {
+  absl::string_view rest = specification;
+  if (specification == "null" || specification == "auto" || specification == "portaudio" ||
+      absl::StartsWith(specification, "portaudio:")) {
+    return absl::OkStatus();
+  }
+  if (!absl::ConsumePrefix(&rest, "file:") || rest.empty()) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
+        absl::StrCat("\"", specification,
+                     "\" names no audio device; say auto, portaudio, portaudio:NAME, null "
+                     "or file:PATH"));
+  }
+  if (!HoldsOther(std::string(rest))) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
+                 absl::StrCat("\"", rest,
+                              "\" holds something other than a WAV sound, and stays as it is: "
+                              "name another file with --audio-device file:PATH"));
+}
+
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenDevice(const DeviceSettings& settings,
                                                         Clock& clock) {
-  const absl::string_view specification = settings.specification;
-  absl::string_view rest = specification;
-  if (specification == "null") return OpenNullDevice(settings.format, clock);
-  if (specification == "auto" || specification == "portaudio") {
-    return OpenDeviceProcess(settings.program, "", settings.format, clock);
-  }
-  if (absl::ConsumePrefix(&rest, "portaudio:")) {
-    return OpenDeviceProcess(settings.program, rest, settings.format, clock);
-  }
-  if (absl::ConsumePrefix(&rest, "file:") && !rest.empty()) {
-    return OpenFileDevice(rest, settings.format, clock);
-  }
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
-                 absl::StrCat("\"", specification,
-                              "\" names no audio device; say auto, portaudio, portaudio:NAME, null "
-                              "or file:PATH"));
+  RETURN_IF_ERROR(CheckDevice(settings.specification));
+  absl::string_view rest = settings.specification;
+  if (rest == "null") return OpenNullDevice(settings.format, clock);
+  if (absl::ConsumePrefix(&rest, "file:")) return OpenFileDevice(rest, settings.format, clock);
+  if (!absl::ConsumePrefix(&rest, "portaudio:")) rest = "";
+  return OpenDeviceProcess(settings.program, rest, settings.format, clock);
 }
 
 }  // namespace carillon

@@ -4,7 +4,9 @@
 #include <memory>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "server/audio_device/audio_device.h"
 #include "server/base/clock.h"
 
@@ -20,8 +22,12 @@ struct DeviceSettings {
   std::string program{};
 };
 
-/// Opens a device. Errors: InvalidArgument (INVALID_AUDIO_DEVICE), and those of OpenDeviceProcess
-/// and WavWriter::Make.
+/// Checks DeviceSettings::specification without opening a device. Errors: InvalidArgument
+/// (INVALID_AUDIO_DEVICE: it names no kind of device, or a file that holds something else than a
+/// sound).
+absl::Status CheckDevice(absl::string_view specification);
+
+/// Opens a device. Errors: those of CheckDevice, OpenDeviceProcess and WavWriter::Make.
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenDevice(const DeviceSettings& settings,
                                                         Clock& clock);
 

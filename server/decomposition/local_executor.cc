@@ -265,13 +265,16 @@ absl::Status PrepareDirectory(const std::filesystem::path& directory) {
 
 }  // namespace
 
+absl::Status CheckLocalExecutor(const LocalExecutorOptions& options) {
+  if (access(options.program.c_str(), X_OK) == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kFailedPrecondition, "WORKER_NOT_FOUND",
+                 absl::StrCat(options.program.string(),
+                              " cannot be executed: install carillon-precompute, or name it"));
+}
+
 absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                             const Clock& clock) {
-  if (access(options.program.c_str(), X_OK) != 0) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "WORKER_NOT_FOUND",
-                   absl::StrCat(options.program.string(),
-                                " cannot be executed: install carillon-precompute, or name it"));
-  }
+  RETURN_IF_ERROR(CheckLocalExecutor(options));
   RETURN_IF_ERROR(PrepareDirectory(options.directory));
   LocalExecutorOptions filled = options;
   filled.program = std::filesystem::absolute(options.program);

@@ -25,12 +25,16 @@ struct LocalExecutorOptions {
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
 };
 
+/// Checks the options without making anything. Errors: FailedPrecondition (WORKER_NOT_FOUND:
+/// `program` cannot be executed).
+absl::Status CheckLocalExecutor(const LocalExecutorOptions& options);
+
 /// Runs each decomposition in a child process (child_process.h), with limits of memory and time.
 /// One thread starts and watches all workers, because the kernel sends the parent-death signal when
 /// the starting *thread* ends. A second thread makes the calls that wait for the disk, so that they
-/// delay neither progress nor a cancellation. Errors: FailedPrecondition (WORKER_NOT_FOUND:
-/// `program` cannot be executed; DATABASE_UNUSABLE: the directory cannot be made). `clock` must
-/// outlive the executor.
+/// delay neither progress nor a cancellation. Errors: those of CheckLocalExecutor,
+/// FailedPrecondition (DATABASE_UNUSABLE: the directory cannot be made). `clock` must outlive the
+/// executor.
 absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                             const Clock& clock);
 

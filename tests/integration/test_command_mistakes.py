@@ -90,8 +90,8 @@ class LostOutputTest(CommandLineTest):
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
         sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
         strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0.01")
-        commands = (("--help",), ("--version",), ("--man",), ("status",), ("info",), ("db", "stats"), ("doctor",),
-                    ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
+        commands = (("--help",), ("--version",), ("--man",), ("status",), ("health",), ("info",), ("db", "stats"),
+                    ("doctor",), ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
                     ("job", "watch", "bar"), ("material", "list"), ("volume",), ("stop",),
                     ("top", "--once"), ("top",), ("completion", "bash"), ("listen", "--seconds", "0.1"), strike,
                     ("render", trace, "--out", "-"), ("render", trace, "--out", self.folder / "lost.wav"),

@@ -5,6 +5,8 @@ import datetime
 import hashlib
 import json
 import pathlib
+import resource
+import signal
 import sqlite3
 import subprocess
 import tempfile
@@ -17,6 +19,12 @@ from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc
 from daemon import BIN, Daemon
 
 import grpc
+
+
+def allow_small_files_only():
+    """As on a full disk: a write beyond 8 KiB fails, and does not end the program."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
 
 
 class DatabaseCommandsTest(unittest.TestCase):
@@ -142,6 +150,54 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertTrue((self.folder / "data/carillon.db.replaced").exists())
         self.daemon.start()
         self.assertIn("bar", self.run_command("model", "list"))
+
+    def test_a_backup_replaces_a_file_only_once_it_is_complete(self):
+        backup = self.folder / "backup.db"
+        link = self.folder / "link.db"
+        link.symlink_to(backup.name)
+        for target in (backup, link):
+            backup.write_bytes(b"an older copy")
+            backup.chmod(0o644)
+            self.run_command("db", "backup", target)
+            self.assertEqual(backup.read_bytes()[:16], b"SQLite format 3\0")
+            self.assertEqual(backup.stat().st_mode & 0o777, 0o600)
+            self.assertTrue(link.is_symlink())
+        before = backup.read_bytes()
+        files = sorted(self.folder.iterdir())
+        # Nothing is left of a copy that does not fit.
+        cut = subprocess.run([BIN / "carillon", "--server", self.daemon.server, "db", "backup", backup], check=False,
+                             capture_output=True, text=True, preexec_fn=allow_small_files_only)
+        self.assertEqual(cut.returncode, 1)
+        self.assertIn("OUTPUT_NOT_WRITABLE: ", cut.stderr)
+        nobody = subprocess.run([BIN / "carillon", "--server", f"unix:{self.folder}/nobody", "db", "backup", backup],
+                                capture_output=True, text=True, check=False)
+        self.assertEqual(nobody.returncode, 3)
+        self.assertEqual(backup.read_bytes(), before)
+        self.assertEqual(sorted(self.folder.iterdir()), files)
+
+    def test_a_backup_never_replaces_the_database_of_a_daemon(self):
+        link = self.folder / "link.db"
+        link.symlink_to("data/carillon.db")
+        data = self.folder / "data"
+        for target in (data / "carillon.db", link, data / "carillon.db-wal", data / "carillon.db-count"):
+            refused = self.daemon.command("db", "backup", target, check=False)
+            self.assertEqual(refused.returncode, 1, target)
+            self.assertRegex(refused.stderr, f"OUTPUT_IN_USE: {target} belongs to the database of a daemon.*another")
+        self.assertIn("bar", self.run_command("model", "list"))
+        self.daemon.stop()
+        self.assertEqual(self.offline("check").returncode, 0)
+        self.daemon.start()
+
+    def test_a_backup_goes_into_pipes_and_names_what_it_cannot_write(self):
+        piped = subprocess.run([BIN / "carillon", "--server", self.daemon.server, "db", "backup", "/dev/stdout"],
+                               capture_output=True, check=True)
+        self.assertEqual(piped.stdout[:16], b"SQLite format 3\0")
+        for target, why in ((self.folder, "it is a folder; name a file"),
+                            (self.folder / "none/backup.db", f"the folder {self.folder}/none does not exist"),
+                            ("/dev/full", "No space left on device")):
+            refused = self.daemon.command("db", "backup", target, check=False)
+            self.assertEqual(refused.returncode, 1, target)
+            self.assertIn(f"OUTPUT_NOT_WRITABLE: {target} cannot be written: {why}", refused.stderr)
 
     def test_check_finds_a_flipped_bit_and_repair_keeps_the_rest(self):
         self.run_command("model", "tag", "bar", "--add", "whole", "--pin")

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`carillon doctor` where something else than a daemon sits at the socket."""
+"""`carillon doctor` and `carillon health` where a part of the daemon does not serve, and where something else than a
+daemon sits at the socket."""
 
 import contextlib
+import json
+import pathlib
+import shutil
 import socket
 import subprocess
 import tempfile
 import time
 import unittest
 
-from daemon import BIN
+from daemon import BIN, Daemon
 
 
 class DoctorTest(unittest.TestCase):
@@ -29,6 +33,68 @@ class DoctorTest(unittest.TestCase):
                 self.assertEqual(told.returncode, 1)
                 self.assertRegex(told.stdout, f"FAULT  daemon .*the process at {path} has sent nothing for 5 s: "
                                               ".*start carillond again")
+
+
+class HealthTest(unittest.TestCase):
+    MODELS = "carillon.v1.ModalModelService"
+    DECOMPOSITIONS = "carillon.v1.DecompositionService"
+
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
+        self.precompute = self.folder / "precompute"
+        shutil.copy("/bin/true", self.precompute)
+        self.daemon = Daemon(self.folder, "--precompute", self.precompute)
+        self.addCleanup(self.daemon.stop)
+
+    def wait_until_not_serving(self, service):
+        end_s = time.monotonic() + 30
+        while self.daemon.health(service) != "NOT_SERVING":
+            self.assertLess(time.monotonic(), end_s, service)
+            time.sleep(0.05)
+
+    def findings(self, verdict="FAULT"):
+        """The texts of the doctor's findings with this verdict, by their subject."""
+        told = json.loads(self.daemon.command("doctor", "--json", check=False).stdout)
+        return {found["subject"]: found["text"] for found in told["findings"] if found["verdict"] == verdict}
+
+    def test_the_doctor_names_the_process_and_finds_that_every_service_serves(self):
+        found = self.findings("OK")
+        process = f"carillond (process {self.daemon.process.pid})"
+        self.assertEqual(found["socket"], f"{process} listens at {self.folder}/socket")
+        self.assertEqual(found["health"], "every service is SERVING")
+
+    def test_health_prints_each_service_and_succeeds_only_if_all_serve(self):
+        serving = self.daemon.command("health", check=False)
+        self.assertEqual((serving.returncode, serving.stderr), (0, ""))
+        self.assertEqual([line.split() for line in serving.stdout.splitlines()],
+                         [[name, "SERVING"] for name in
+                          ("carillond", "carillon.v1.AudioService", self.MODELS, self.DECOMPOSITIONS)])
+        self.precompute.unlink()
+        self.wait_until_not_serving(self.DECOMPOSITIONS)
+        without = self.daemon.command("health", check=False)
+        self.assertEqual(without.returncode, 1)
+        self.assertRegex(without.stdout, rf"(?m)^{self.DECOMPOSITIONS} +NOT_SERVING$")
+        self.assertRegex(without.stdout, rf"(?m)^{self.MODELS} +SERVING$")
+        self.assertRegex(without.stderr, f"^carillon: NOT_SERVING: .*`carillon doctor`.* {self.DECOMPOSITIONS}\n$")
+        told = self.daemon.command("health", "--json", check=False)
+        self.assertEqual((told.returncode, json.loads(told.stdout)),
+                         (1, {"serving": ["carillond", "carillon.v1.AudioService", self.MODELS],
+                              "not_serving": [self.DECOMPOSITIONS]}))
+
+    def test_the_doctor_finds_a_program_of_decompositions_that_the_daemon_lacks(self):
+        self.assertNotIn("workers", self.findings())
+        self.precompute.unlink()
+        self.wait_until_not_serving(self.DECOMPOSITIONS)
+        found = self.findings()
+        self.assertRegex(found["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*put that program back")
+        self.assertNotIn("database", found)
+
+    def test_the_doctor_finds_a_database_that_was_moved_away(self):
+        (self.folder / "data/carillon.db").rename(self.folder / "data/away.db")
+        self.wait_until_not_serving(self.MODELS)
+        found = self.findings()
+        self.assertRegex(found["database"], f"^{self.MODELS} is NOT_SERVING, .*stop the daemon, put the file back")
+        self.assertRegex(found["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*see the database above")
 
 
 if __name__ == "__main__":

@@ -44,6 +44,8 @@ class TlsTest(unittest.TestCase):
         doctor = subprocess.run([BIN / "carillon", "--server", self.address, "--tls-roots", self.certificate, "doctor"],
                                 capture_output=True, text=True, check=False, timeout=60)
         self.assertRegex(doctor.stdout, "FAULT  expiry .* expires on 20..-..-.. ..:.. UTC.*reload the daemon")
+        over_socket = self.daemon.command("doctor", check=False)
+        self.assertRegex(over_socket.stdout, "ok +tls +the daemon serves TLS over TCP, and its Unix socket needs none")
         end_s = time.monotonic() + 30
         while "a certificate of the daemon expires in 1 days" not in (self.folder / "log").read_text():
             self.assertLess(time.monotonic(), end_s, (self.folder / "log").read_text())

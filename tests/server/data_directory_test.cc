@@ -23,6 +23,21 @@ TEST(DataDirectory, IsMadeForItsOwnerOnly) {
             std::filesystem::perms::owner_all);
 }
 
+TEST(DataDirectory, IsCheckedWithoutBeingMade) {
+  const TemporaryFolder folder;
+  EXPECT_TRUE(DataDirectory::Check(folder / "a/b").ok());
+  EXPECT_TRUE(DataDirectory::Check(folder / "a").ok());
+  EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+  WriteBytes(folder / "file", "");
+  for (const std::filesystem::path& path :
+       {folder / "file", folder / "file/a", std::filesystem::path("/proc/a/b")}) {
+    EXPECT_THAT(DataDirectory::Check(path).ToString(),
+                testing::HasSubstr("DATA_DIRECTORY_UNUSABLE: "))
+        << path;
+    EXPECT_FALSE(DataDirectory::Open(path).ok()) << path;
+  }
+}
+
 TEST(DataDirectory, IsHeldByOneAtATime) {
   const TemporaryFolder folder;
   std::optional<absl::StatusOr<DataDirectory>> first = DataDirectory::Open(folder / "data");

@@ -76,28 +76,42 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   };
   expect("volume = 11\n", "volume");
   expect("sample_rate = \"high\"\n", "sample_rate");
-  expect("sample_rate = 100\n", "--sample-rate");
-  expect("block_frames = 4096\n", "--block-frames");
+  expect("\nsample_rate = 100\n", " line 2: sample_rate is 100; it must be 8000 to 192000");
+  expect("block_frames = 4096\n", " line 1: block_frames is 4096");
+  expect("memory_budget_mib = 1099511627777\n", "is 1099511627777; it must be 0 to 1099511627776");
+  expect("executor = \"cloud\"\n", " line 1: executor is \"cloud\"; it must be local or slurm");
   expect("listen = []\n", "--listen");
   expect("tls_key = \"key.pem\"\n", "--tls-certificate");
   expect("a = \n", "line 1");
   expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
   expect("workers = 1\ntransfers = 1\n", "line 2: transfers has a value of the wrong type");
-  expect("data_dir = \"\"\n", "--data-dir");
-  expect("scene_grace = -1\n", "--scene-grace");
-  expect("client_share = 0\n", "--client-share");
-  expect("metrics = \"9464\"\n", "--metrics");
+  expect("data_dir = \"\"\n", " line 1: data_dir names no folder");
+  expect("scene_grace = -1\n", " line 1: scene_grace is -1");
+  expect("client_share = 0\n", " line 1: client_share is 0; it must be 0.001 to 1");
+  expect("metrics = \"9464\"\n", " line 1: metrics is \"9464\"");
   expect("log_level = \"loud\"\n",
-         "--log-level is \"loud\"; it must be debug, info, warning or error");
-  expect("log_level = \"off\"\n", "--log-level");
+         " line 1: log_level is \"loud\"; it must be debug, info, warning or error");
+  expect("log_level = \"off\"\n", " line 1: log_level");
   for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
-    expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), "--slurm-upload");
+    expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), " line 1: slurm_upload");
   }
+}
+
+TEST(Options, AFlagOutOfRangeIsNamedAsItIsWritten) {
+  EXPECT_THAT(Read({"--sample-rate", "1"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: --sample-rate is 1; it must be 8000 to 192000"));
+  EXPECT_THAT(Read({"--scene-grace", "nan"}).status().ToString(),
+              HasSubstr("--scene-grace is nan"));
 }
 
 TEST(Options, AFileThatIsNotThereIsRefused) {
   EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
-              HasSubstr("INVALID_CONFIGURATION: "));
+              HasSubstr("INVALID_CONFIGURATION: /nonexistent.toml: "));
+}
+
+TEST(Options, AFolderIsNoConfiguration) {
+  EXPECT_THAT(Read({"--config", "/"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: /: it is a folder"));
 }
 
 TEST_F(OptionsFile, TheLogLevelIsInfoUnlessAnotherIsNamed) {

@@ -258,7 +258,7 @@ class AccessTest(unittest.TestCase):
         done = subprocess.run([BIN / "carillond", "--data-dir", self.folder / "data", "--audio-device", "null",
                                "--listen", listen, *map(str, arguments)],
                               capture_output=True, text=True, check=False, timeout=60)
-        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(done.returncode, 2, done.stderr)
         return done.stderr
 
     def test_files_that_are_unsafe_or_useless_are_refused_at_the_start(self):

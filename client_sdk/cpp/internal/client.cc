@@ -82,6 +82,10 @@ absl::StatusOr<v1::GetServerInfoResponse> Client::GetServerInfo() const {
   return NotOverridden("GetServerInfo");
 }
 
+absl::StatusOr<bool> Client::IsServing(const std::string&) const {
+  return NotOverridden("IsServing");
+}
+
 absl::StatusOr<std::string> Client::UploadMesh(absl::string_view) const {
   return NotOverridden("UploadMesh");
 }

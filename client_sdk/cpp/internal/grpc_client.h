@@ -24,6 +24,9 @@ namespace carillon::client {
 /// The time limit of a call with one answer. It is far above the time of any such call; the slowest
 /// call reads a large model from the disk.
 inline constexpr auto kCallTimeout = std::chrono::seconds(60);
+/// The time limit of a call for the daemon's health. The daemon answers it at once, because gRPC
+/// answers for it.
+inline constexpr auto kHealthTimeout = std::chrono::seconds(10);
 
 /// The client that talks to a daemon: one gRPC channel, and one stub for each service.
 class GrpcClient final : public Client {
@@ -31,6 +34,7 @@ class GrpcClient final : public Client {
   GrpcClient(const std::string& server, const ConnectOptions& options);
 
   absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const override;
+  absl::StatusOr<bool> IsServing(const std::string& service) const override;
 
   absl::StatusOr<std::string> UploadMesh(absl::string_view bytes) const override;
   absl::StatusOr<v1::Job> CreateModalModel(
@@ -107,10 +111,10 @@ class GrpcClient final : public Client {
 
  private:
   struct Stubs {
-    Stubs(std::string address, std::string shown_token,
-          const std::shared_ptr<grpc::Channel>& channel)
+    Stubs(std::string address, std::string shown_token, std::shared_ptr<grpc::Channel> opened)
         : server(std::move(address)),
           token(std::move(shown_token)),
+          channel(std::move(opened)),
           models(channel),
           decompositions(channel),
           scenes(channel),
@@ -122,6 +126,7 @@ class GrpcClient final : public Client {
 
     const std::string server;
     const std::string token;
+    const std::shared_ptr<grpc::Channel> channel;
     v1::ModalModelService::Stub models;
     v1::DecompositionService::Stub decompositions;
     v1::SceneService::Stub scenes;

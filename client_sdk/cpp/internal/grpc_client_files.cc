@@ -3,14 +3,15 @@
 // The calls that transfer models and files, and those of administrators.
 #include <grpcpp/client_context.h>
 
+#include <algorithm>
 #include <chrono>
-#include <fstream>
 #include <utility>
 
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/model_file.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
+#include "client_sdk/cpp/internal/whole_file.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
@@ -65,27 +66,27 @@ absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() cons
 }
 
 absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
-  std::ofstream out(file, std::ios::binary);
-  if (!out) return NotWritable(file);
+  ASSIGN_OR_RETURN(WholeFile copy, WholeFile::Create(file));
   grpc::ClientContext context;
   Authorize(context, stubs_->token);
   const auto reader = stubs_->admin.BackUpDatabase(&context, {});
   v1::BackUpDatabaseResponse response;
   uint64_t byte_count = 0;
   uint64_t received = 0;
-  while (out && reader->Read(&response)) {
+  absl::Status written = absl::OkStatus();
+  while (written.ok() && reader->Read(&response)) {
     byte_count = std::max(byte_count, response.byte_count());
     received += response.data().size();
-    out << response.data();
+    written = copy.Write(response.data());
   }
-  out.close();
-  if (!out) context.TryCancel();
-  absl::Status status = FromRpc(reader->Finish(), stubs_->server);
-  if (!out) return NotWritable(file);
-  if (status.ok() && received != byte_count) {
+  if (!written.ok()) context.TryCancel();
+  const absl::Status status = FromRpc(reader->Finish(), stubs_->server);
+  RETURN_IF_ERROR(written);
+  RETURN_IF_ERROR(status);
+  if (received == 0 || received != byte_count) {
     return absl::DataLossError("the daemon ended before the whole copy was sent");
   }
-  return status;
+  return copy.Publish();
 }
 
 absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(

@@ -23,6 +23,7 @@ class ClientWithoutDaemon : public testing::Test {
 TEST_F(ClientWithoutDaemon, IsToldSoByEveryKindOfCall) {
   const auto unavailable = HasSubstr("SERVER_UNAVAILABLE: ");
   EXPECT_THAT(client_->GetServerInfo().status().ToString(), unavailable);
+  EXPECT_THAT(client_->IsServing("").status().ToString(), unavailable);
   EXPECT_THAT(client_->GetMixer().status().ToString(), unavailable);
   EXPECT_THAT(client_->UploadMesh("v 0 0 0").status().ToString(), unavailable);
   EXPECT_THAT(client_->WatchJob("jobs/a", nullptr).status().ToString(), unavailable);

@@ -60,6 +60,12 @@ class Client {
   /// Returns the version, the age, the limits and the features of the daemon. Needs no token.
   virtual absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const;
 
+  /// Returns whether a service, such as "carillon.v1.AudioService", is SERVING after the daemon's
+  /// health (grpc.health.v1); docs/operations.md has the services and what keeps each from serving.
+  /// The empty name is the whole daemon. Needs no token. Returns DEADLINE_EXCEEDED (SERVER_TIMEOUT)
+  /// after 10 seconds.
+  virtual absl::StatusOr<bool> IsServing(const std::string& service) const;
+
   // Modal models.
 
   /// Stores the bytes of a mesh file and returns their digest, which CreateModalModel takes.
@@ -263,8 +269,10 @@ class Client {
   /// Returns the size and the contents of the daemon's database.
   virtual absl::StatusOr<v1::GetDatabaseStatsResponse> GetDatabaseStats() const;
 
-  /// Writes a consistent copy of the daemon's database to a file.
-  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), DATA_LOSS.
+  /// Writes a consistent copy of the daemon's database to a file. A file that has the name already
+  /// is replaced once the copy is complete; after an error it stays as it was.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION (OUTPUT_IN_USE: the file
+  /// belongs to the database of a daemon), DATA_LOSS.
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 
   /// Deletes the models that sounded least recently until the others fit into the request's budget.

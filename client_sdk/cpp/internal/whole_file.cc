@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/internal/whole_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Suffixes of the files that belong to a database and have its name.
+constexpr const char* kCompanions[] = {"-wal", "-count", "-reserve"};
+
+absl::Status NotWritable(const std::string& path, absl::string_view why) {
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat(path, " cannot be written: ", why));
+}
+
+absl::Status InUse(const std::string& path, const std::string& companion) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "OUTPUT_IN_USE",
+                 absl::StrCat(path, " belongs to the database of a daemon, because ", companion,
+                              " is beside it, and stays as it is: name another file"));
+}
+
+/// Refuses to replace a database of a daemon, or a file that belongs to one.
+absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final_path) {
+  std::error_code ignored;
+  for (const char* const companion : kCompanions) {
+    const std::string beside = final_path + companion;
+    if (fs::exists(beside, ignored)) return InUse(path, beside);
+    absl::string_view database = final_path;
+    if (!absl::ConsumeSuffix(&database, companion)) continue;
+    if (fs::exists(fs::path(std::string(database)), ignored)) {
+      return InUse(path, std::string(database));
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// Whether the bytes go to the file at once: it is a device or a pipe, or the name of an open file.
+bool TakesBytesAtOnce(const std::string& path, fs::file_type type) {
+  if (absl::StartsWith(path, "/dev/") || absl::StartsWith(path, "/proc/")) return true;
+  return type != fs::file_type::regular && type != fs::file_type::not_found;
+}
+
+/// Returns the path with the file to which it leads, without symbolic links. The file need not
+/// exist.
+fs::path WithoutLinks(const std::string& path) {
+  std::error_code ignored;
+  fs::path found = fs::absolute(path, ignored);
+  // The system follows at most 40 links.
+  for (int left = 40; left > 0 && fs::is_symlink(found, ignored); --left) {
+    const fs::path target = fs::read_symlink(found, ignored);
+    found = found.parent_path() / target;
+  }
+  const fs::path folder = fs::canonical(found.parent_path(), ignored);
+  return folder.empty() ? found : folder / found.filename();
+}
+
+/// Flushes the entry of a new name to the disk.
+void SyncFolder(const std::string& file) {
+  const int folder = open(fs::path(file).parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return;
+  fsync(folder);
+  close(folder);
+}
+
+}  // namespace
+
+absl::StatusOr<WholeFile> WholeFile::Create(const std::string& path) {
+  const std::string final_path = WithoutLinks(path);
+  std::error_code ignored;
+  const fs::file_type type = fs::status(path, ignored).type();
+  if (type == fs::file_type::directory) return NotWritable(path, "it is a folder; name a file");
+  RETURN_IF_ERROR(CheckIsNoDatabase(path, final_path));
+  WholeFile file(path, TakesBytesAtOnce(path, type) ? "" : final_path);
+  if (!file.final_path_.empty()) {
+    RETURN_IF_ERROR(file.OpenBeside());
+    return file;
+  }
+  file.descriptor_ = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file.descriptor_ < 0) return file.Failed(errno);
+  return file;
+}
+
+WholeFile::WholeFile(std::string path, std::string final_path)
+    : path_(std::move(path)), final_path_(std::move(final_path)) {}
+
+WholeFile::WholeFile(WholeFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      final_path_(std::move(other.final_path_)),
+      temporary_(std::exchange(other.temporary_, "")),
+      descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+WholeFile::~WholeFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+  if (!temporary_.empty()) unlink(temporary_.c_str());
+}
+
+absl::Status WholeFile::OpenBeside() {
+  const fs::path folder = fs::path(final_path_).parent_path();
+  if (std::error_code ignored; !fs::exists(folder, ignored)) {
+    return NotWritable(path_, absl::StrCat("the folder ", folder.string(), " does not exist"));
+  }
+  // If the process is killed, nothing remains of a file that has no name yet.
+  descriptor_ = open(folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0600);
+  if (descriptor_ >= 0) return absl::OkStatus();
+  // Not every file system has files without a name.
+  std::string name = final_path_ + ".XXXXXX";
+  descriptor_ = mkostemp(name.data(), O_CLOEXEC);
+  if (descriptor_ < 0) return Failed(errno);
+  temporary_ = name;
+  return absl::OkStatus();
+}
+
+absl::Status WholeFile::NameBeside() {
+  const std::string open_file = absl::StrCat("/proc/self/fd/", descriptor_);
+  // A killed process may have left the first names.
+  for (int i = 0; i < 100; ++i) {
+    const std::string name = absl::StrCat(final_path_, ".", getpid(), "-", i);
+    if (linkat(AT_FDCWD, open_file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+      temporary_ = name;
+      return absl::OkStatus();
+    }
+    if (errno != EEXIST) break;
+  }
+  return Failed(errno);
+}
+
+absl::Status WholeFile::Failed(int error) const {
+  return NotWritable(path_, std::generic_category().message(error));
+}
+
+absl::Status WholeFile::Write(absl::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return Failed(errno);
+    bytes.remove_prefix(static_cast<size_t>(written));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status WholeFile::Publish() {
+  if (final_path_.empty()) {
+    return close(std::exchange(descriptor_, -1)) == 0 ? absl::OkStatus() : Failed(errno);
+  }
+  if (fsync(descriptor_) != 0) return Failed(errno);
+  if (temporary_.empty()) RETURN_IF_ERROR(NameBeside());
+  if (rename(temporary_.c_str(), final_path_.c_str()) != 0) return Failed(errno);
+  temporary_.clear();
+  SyncFolder(final_path_);
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::client

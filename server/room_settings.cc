@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/room_settings.h"
+
+#include <chrono>
+#include <cstdint>
+
+#include "proto/cpp/status_macros.h"
+#include "server/audio_device/open_device.h"
+
+namespace carillon {
+namespace {
+
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+}
+
+}  // namespace
+
+LocalExecutorOptions LocalExecutorOptionsOf(const Options& options) {
+  LocalExecutorOptions local;
+  local.program = options.precompute_program;
+  local.directory = DataDirectory::WorkDirectory(options.data_directory);
+  local.worker_count = options.worker_count;
+  local.memory_budget_bytes = static_cast<uint64_t>(options.memory_budget_mib) << 20U;
+  local.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
+  local.time_limit = Milliseconds(options.job_time_s);
+  local.stall_limit = Milliseconds(options.stall_time_s);
+  return local;
+}
+
+OutputSettings OutputSettingsOf(const Options& options) {
+  return {.format = {.sample_rate_hz = options.sample_rate_hz,
+                     .block_frame_count = options.block_frame_count,
+                     .channel_count = options.channel_count},
+          .look_ahead_block_count = options.look_ahead_block_count,
+          .device = options.audio_device,
+          .device_program = options.audio_program,
+          .gain = options.gain,
+          .full_scale_pa = options.full_scale_pa};
+}
+
+ApiSettings ApiSettingsOf(const Options& options) {
+  return {.addresses = options.addresses,
+          .tls = {.certificate = options.tls_certificate_file,
+                  .key = options.tls_key_file,
+                  .client_roots = options.tls_client_roots_file},
+          .access_file = options.access_file,
+          .head_file = options.head_file,
+          .version = CARILLON_VERSION,
+          .scene_grace_s = options.scene_grace_s,
+          .client_share = options.client_share,
+          .precompute_program = options.precompute_program,
+          .slurm = options.executor == "slurm"};
+}
+
+absl::Status CheckRooms(const Options& options) {
+  RETURN_IF_ERROR(DataDirectory::Check(options.data_directory));
+  if (options.executor == "local") {
+    RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
+  }
+  RETURN_IF_ERROR(CheckDevice(options.audio_device));
+  return ApiServer::Check(ApiSettingsOf(options), options.sample_rate_hz);
+}
+
+}  // namespace carillon

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "absl/status/status.h"
+#include "server/api/api_server.h"
+#include "server/data_directory.h"
+#include "server/decomposition/local_executor.h"
+#include "server/live_output/live_output.h"
+#include "server/options.h"
+
+namespace carillon {
+
+/// The parts of the daemon's settings that each room takes.
+LocalExecutorOptions LocalExecutorOptionsOf(const Options& options);
+OutputSettings OutputSettingsOf(const Options& options);
+ApiSettings ApiSettingsOf(const Options& options);
+
+/// Checks what the rooms will make of the settings, as far as this needs no device and no socket
+/// and changes nothing. Errors: those of DataDirectory::Check, CheckLocalExecutor, CheckDevice and
+/// ApiServer::Check.
+absl::Status CheckRooms(const Options& options);
+
+}  // namespace carillon

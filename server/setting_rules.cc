@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/setting_rules.h"
+
+#include <algorithm>
+#include <array>
+
+#include "absl/algorithm/container.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon {
+namespace {
+
+constexpr double kMostMib = 0x1p40;
+constexpr double kMostSeconds = 1e8;
+
+struct Range {
+  absl::string_view key;
+  double least;
+  double most;
+};
+
+constexpr auto kRanges = std::to_array<Range>({
+    {"sample_rate", 8000, 192000},
+    {"channels", 1, 2},
+    {"gain", 0, 1000},
+    {"full_scale_pa", kLeastFullScalePa, kMostFullScalePa},
+    {"block_frames", 16, 256},
+    {"look_ahead_blocks", 2, 64},
+    {"workers", 0, 1024},
+    {"memory_budget_mib", 0, kMostMib},
+    {"job_memory_mib", 0, kMostMib},
+    {"job_time", 0.1, kMostSeconds},
+    {"stall_time", 0.1, kMostSeconds},
+    {"scene_grace", 0, kMostSeconds},
+    {"client_share", 0.001, 1},
+    {"queue_limit", 1, 1e6},
+    {"model_budget_mib", 0, kMostMib},
+});
+
+constexpr auto kLogLevels = std::to_array<absl::string_view>({"debug", "info", "warning", "error"});
+
+bool IsHostAndPort(absl::string_view text) {
+  const size_t colon = text.rfind(':');
+  int port = 0;
+  return colon != absl::string_view::npos && colon > 0 &&
+         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
+}
+
+}  // namespace
+
+absl::Status InvalidConfiguration(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION", message);
+}
+
+absl::Status CheckNumber(absl::string_view key, absl::string_view name, double value) {
+  const auto* const range = std::ranges::find(kRanges, key, &Range::key);
+  if (range == kRanges.end()) return absl::OkStatus();
+  if (value >= range->least && value <= range->most) return absl::OkStatus();
+  return InvalidConfiguration(absl::StrFormat("%s is %.15g; it must be %.15g to %.15g", name, value,
+                                              range->least, range->most));
+}
+
+absl::Status CheckText(absl::string_view key, absl::string_view name, absl::string_view value) {
+  const std::string is = absl::StrCat(name, " is \"", value, "\"; it must be ");
+  if (key == "executor" && value != "local" && value != "slurm") {
+    return InvalidConfiguration(absl::StrCat(is, "local or slurm"));
+  }
+  if (key == "log_level" && !absl::c_linear_search(kLogLevels, value)) {
+    return InvalidConfiguration(absl::StrCat(is, "debug, info, warning or error"));
+  }
+  if (key == "data_dir" && value.empty()) {
+    return InvalidConfiguration(absl::StrCat(name, " names no folder"));
+  }
+  if (value.empty() || IsHostAndPort(value)) return absl::OkStatus();
+  if (key == "slurm_upload") {
+    return InvalidConfiguration(absl::StrCat(is, "HOST:PORT, as the nodes reach it"));
+  }
+  if (key == "metrics")
+    return InvalidConfiguration(absl::StrCat(is, "HOST:PORT, as 127.0.0.1:9464"));
+  return absl::OkStatus();
+}
+
+absl::Status CheckTogether(const Options& options) {
+  if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
+  if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
+    return InvalidConfiguration("--tls-certificate and --tls-key must be given together");
+  }
+  if (options.tls_certificate_file.empty() && !options.tls_client_roots_file.empty()) {
+    return InvalidConfiguration("--tls-client-roots needs --tls-certificate and --tls-key");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "server/options.h"
+
+namespace carillon {
+
+/// Returns InvalidArgument (INVALID_CONFIGURATION).
+absl::Status InvalidConfiguration(absl::string_view message);
+
+/// Checks one setting that is a number. `key` is the setting's key in the configuration file, and
+/// `name` is how the user wrote it, as a key or as a flag. Errors: InvalidArgument
+/// (INVALID_CONFIGURATION).
+absl::Status CheckNumber(absl::string_view key, absl::string_view name, double value);
+
+/// Checks one setting that is a text. Errors: those of CheckNumber.
+absl::Status CheckText(absl::string_view key, absl::string_view name, absl::string_view value);
+
+/// Checks which settings are given together. Errors: those of CheckNumber.
+absl::Status CheckTogether(const Options& options);
+
+}  // namespace carillon

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cpp/internal/whole_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace carillon::client {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class WholeFileTest : public testing::Test {
+ protected:
+  void SetUp() override { fs::create_directory(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  static void Put(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
+
+  static std::string TextOf(const fs::path& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  /// The number of files in the folder.
+  ptrdiff_t Count() const {
+    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
+  }
+
+  static std::string Refused(const fs::path& path) {
+    return WholeFile::Create(path).status().ToString();
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / absl::StrCat("whole_file_", getpid());
+  const fs::path file_ = folder_ / "copy.db";
+};
+
+TEST_F(WholeFileTest, AppearsWhenItIsPublishedAndIsReadableForItsOwnerOnly) {
+  absl::StatusOr<WholeFile> file = WholeFile::Create(file_);
+  ASSERT_TRUE(file.ok()) << file.status();
+  ASSERT_TRUE(file->Write("a copy").ok());
+  EXPECT_FALSE(fs::exists(file_));
+  ASSERT_TRUE(file->Publish().ok());
+  EXPECT_EQ(TextOf(file_), "a copy");
+  EXPECT_EQ(fs::status(file_).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(Count(), 1);
+}
+
+TEST_F(WholeFileTest, LeavesAnOlderFileAsItIsAndNothingElseUnlessItIsPublished) {
+  Put(file_, "an older copy");
+  {
+    absl::StatusOr<WholeFile> file = WholeFile::Create(file_);
+    ASSERT_TRUE(file.ok()) << file.status();
+    ASSERT_TRUE(file->Write("a copy").ok());
+  }
+  EXPECT_EQ(TextOf(file_), "an older copy");
+  EXPECT_EQ(Count(), 1);
+}
+
+TEST_F(WholeFileTest, FollowsLinksToAFileThatMayBeMissing) {
+  fs::create_symlink("second", folder_ / "first");
+  fs::create_symlink("copy.db", folder_ / "second");
+  for (const char* text : {"a copy", "a newer copy"}) {
+    absl::StatusOr<WholeFile> file = WholeFile::Create(folder_ / "first");
+    ASSERT_TRUE(file.ok()) << file.status();
+    ASSERT_TRUE(file->Write(text).ok() && file->Publish().ok());
+    EXPECT_EQ(TextOf(file_), text);
+  }
+  EXPECT_TRUE(fs::is_symlink(folder_ / "second"));
+}
+
+TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
+  for (const char* companion : {"-wal", "-count", "-reserve"}) {
+    const std::string beside = file_.string() + companion;
+    Put(file_, "live");
+    Put(beside, "live");
+    fs::create_symlink(file_, folder_ / "link");
+    for (const fs::path& path : {file_, folder_ / "link", fs::path(beside)}) {
+      EXPECT_THAT(Refused(path), HasSubstr("OUTPUT_IN_USE: " + path.string())) << companion;
+    }
+    EXPECT_EQ(TextOf(file_) + TextOf(beside), "livelive");
+    for (const fs::path& path : {fs::path(beside), folder_ / "link"}) fs::remove(path);
+  }
+  EXPECT_TRUE(WholeFile::Create(file_).ok());
+}
+
+TEST_F(WholeFileTest, SaysWhyItCannotBeWritten) {
+  EXPECT_THAT(Refused(folder_), HasSubstr("OUTPUT_NOT_WRITABLE: "));
+  EXPECT_THAT(Refused(folder_), HasSubstr("it is a folder"));
+  EXPECT_THAT(Refused(folder_ / "none/a"), HasSubstr("/none does not exist"));
+  absl::StatusOr<WholeFile> full = WholeFile::Create("/dev/full");
+  ASSERT_TRUE(full.ok()) << full.status();
+  EXPECT_THAT(full->Write("a copy").ToString(), HasSubstr("No space left on device"));
+}
+
+}  // namespace
+}  // namespace carillon::client

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `carillond --check-config` finds in a configuration, and that a start finds the same."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from daemon import BIN
+
+
+class ConfigurationTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
+        self.file = self.folder / "carillond.toml"
+
+    def run_daemon(self, settings, *arguments):
+        """Runs carillond with a configuration with these settings."""
+        usual = {"data_dir": f"{self.folder}/data", "listen": [f"unix:{self.folder}/socket"], "audio_device": "null"}
+        self.file.write_text("".join(f"{key} = {value!r}\n" for key, value in (usual | settings).items()))
+        return subprocess.run([BIN / "carillond", "--config", self.file, *arguments], capture_output=True, text=True,
+                              check=False, timeout=60)
+
+    def test_what_a_start_would_refuse_is_found_by_the_check_and_ends_with_status_2(self):
+        (self.folder / "empty").touch(0o600)
+        files = sorted([*self.folder.iterdir(), self.file])
+        for settings, reason in (({"listen": ["foo"]}, "INVALID_ADDRESS"),
+                                 ({"listen": ["127.0.0.1:99999"]}, "INVALID_ADDRESS"),
+                                 ({"listen": ["0.0.0.0:5001"]}, "TLS_REQUIRED"),
+                                 ({"listen": [f"unix:{self.folder}/empty"]}, "LISTEN_FAILED"),
+                                 ({"listen": ["127.0.0.1:0"], "tls_certificate": "/nope", "tls_key": "/nope"},
+                                  "TLS_UNUSABLE"),
+                                 ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
+                                 ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
+                                 ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
+                                 ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),
+                                 ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
+                                 ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
+                                 ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
+                                 ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
+                                 ({"sample_rate": 1}, f"INVALID_CONFIGURATION: {self.file} line 4: sample_rate is 1")):
+            for arguments in (("--check-config",), ()):
+                with self.subTest(settings=settings, arguments=arguments):
+                    refused = self.run_daemon(settings, *arguments)
+                    self.assertEqual((refused.returncode, refused.stdout), (2, ""), refused.stderr)
+                    self.assertIn(f"error: {reason}", refused.stderr)
+        self.assertEqual(sorted(self.folder.iterdir()), files)  # nothing was made
+
+    def test_what_a_start_takes_is_valid_and_the_check_makes_nothing(self):
+        for settings in ({}, {"listen": ["127.0.0.1:0"]}, {"listen": [f"unix:{self.folder}/a/b/socket"]},
+                         {"data_dir": f"{self.folder}/a/b/c"}, {"audio_device": f"file:{self.folder}/a.wav"},
+                         {"executor": "slurm", "precompute": "/on/each/node"}):
+            with self.subTest(settings=settings):
+                checked = self.run_daemon(settings, "--check-config")
+                self.assertEqual((checked.returncode, checked.stdout), (0, "the configuration is valid\n"),
+                                 checked.stderr)
+        self.assertEqual(list(self.folder.iterdir()), [self.file])
+
+
+if __name__ == "__main__":
+    unittest.main()
