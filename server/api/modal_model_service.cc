@@ -98,8 +98,11 @@ grpc::ServerUnaryReactor* ModalModelService::DeleteModalModel(
 grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::ImportModalModelRaw(
     grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response) {
   return Open(*context, daemon_.writing, Role::kSubmit, Holding::kUpload,
-              [&](const Principal&, ClientPlace place) {
-                return MakeImport(*context, *response, database_, daemon_.writing.pool,
+              [&](const Principal& caller, ClientPlace place) {
+                // Who may delete a model may also replace it.
+                const Replacing replacing =
+                    caller.has(Role::kAdminister) ? Replacing::kUnlessPinned : Replacing::kNever;
+                return MakeImport(*context, *response, {database_, replacing}, daemon_.writing.pool,
                                   BoundsOf(std::move(place)));
               });
 }

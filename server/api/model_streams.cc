@@ -52,8 +52,10 @@ class MeshSink {
 
 class ModelSink {
  public:
-  explicit ModelSink(ModeDatabase& database)
-      : database_(&database), transfers_(database.database()) {}
+  explicit ModelSink(const ImportTarget& target)
+      : database_(&target.database),
+        replacing_(target.replacing),
+        transfers_(target.database.database()) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));
@@ -75,8 +77,10 @@ class ModelSink {
     RETURN_IF_ERROR(transfers_.ForEach(
         [](const StoredTransfer& transfer) { return CheckFigures(transfer.header()); }));
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
+    // A model that this call has stored takes any transfer.
+    const Replacing replacing = import_->kept() ? replacing_ : Replacing::kAlways;
     RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
-      return database_->transfers().Put(summary.digest, transfer).status();
+      return database_->transfers().Put(summary.digest, transfer, replacing).status();
     }));
     *response.mutable_modal_model() = ToProto(summary);
     return absl::OkStatus();
@@ -87,11 +91,13 @@ class ModelSink {
     if (import_) return absl::OkStatus();
     absl::string_view digest = first.name();
     absl::ConsumePrefix(&digest, "modalModels/");
-    ASSIGN_OR_RETURN(import_, database_->models().Import(std::string(digest), first.label()));
+    ASSIGN_OR_RETURN(import_,
+                     database_->models().Import(std::string(digest), first.label(), replacing_));
     return absl::OkStatus();
   }
 
   ModeDatabase* database_;
+  Replacing replacing_;
   std::optional<ModelImport> import_;
   TransferSpool transfers_;
 };
@@ -158,10 +164,10 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
                                                       v1::ImportModalModelResponse& response,
-                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      const ImportTarget& target, ThreadPool& pool,
                                                       CallBounds bounds) {
   return new ReadCall<v1::ImportModalModelRequest, v1::ImportModalModelResponse, ModelSink>(
-      context, response, ModelSink(database), pool, std::move(bounds));
+      context, response, ModelSink(target), pool, std::move(bounds));
 }
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(

@@ -8,6 +8,7 @@
 #include "server/api/call_bounds.h"
 #include "server/api/thread_pool.h"
 #include "server/mode_database/mode_database.h"
+#include "server/mode_database/replacing.h"
 
 namespace carillon {
 
@@ -19,9 +20,15 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
                                                       MeshStore& meshes, ThreadPool& pool,
                                                       CallBounds bounds);
 
+/// The database that takes an import, and whether the import may replace a model of other content.
+struct ImportTarget {
+  ModeDatabase& database;
+  Replacing replacing;
+};
+
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,
                                                       v1::ImportModalModelResponse& response,
-                                                      ModeDatabase& database, ThreadPool& pool,
+                                                      const ImportTarget& target, ThreadPool& pool,
                                                       CallBounds bounds);
 
 grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(

@@ -102,7 +102,8 @@ class Client {
 
   /// Stores the model whose records `send` passes to the sink that it is given. If `send` returns
   /// an error, this error is returned and nothing is stored. `name` is "modalModels/{digest}"; if
-  /// it is empty, the daemon names the model after its content.
+  /// it is empty, the daemon names the model after its content. Further errors: ALREADY_EXISTS
+  /// (MODAL_MODEL_EXISTS: another model has that name, see ModalModelService.ImportModalModel).
   virtual absl::StatusOr<v1::ModalModelSummary> ImportModalModel(
       const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
       const std::string& label) const;
