@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -167,11 +168,15 @@ grpc::ServerUnaryReactor* DecompositionService::ListJobs(grpc::CallbackServerCon
 grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerContext* context,
                                                           const v1::CancelJobRequest* request,
                                                           v1::CancelJobResponse* response) {
-  return Answer(context, writing_, Role::kSubmit, [this, request, response] {
-    ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
-    ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
-    return absl::OkStatus();
-  });
+  return Answer(context, writing_, Role::kSubmit,
+                [this, request, response](const Principal& caller) {
+                  ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
+                  const bool for_all = caller.has(Role::kAdminister);
+                  ASSIGN_OR_RETURN(
+                      *response->mutable_job(),
+                      queue_.Cancel(digest, for_all ? std::nullopt : std::optional(caller.client)));
+                  return absl::OkStatus();
+                });
 }
 
 grpc::ServerWriteReactor<v1::WatchJobResponse>* DecompositionService::WatchJob(

@@ -81,8 +81,9 @@ absl::StatusOr<DecompositionJobPage> DecompositionQueue::List(int page_size,
   return core_->List(page_size, page_token, filter);
 }
 
-absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest) {
-  return core_->Cancel(digest);
+absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest,
+                                                   const std::optional<std::string>& client) {
+  return core_->Cancel(digest, client);
 }
 
 absl::StatusOr<std::unique_ptr<JobWatch>> DecompositionQueue::Watch(

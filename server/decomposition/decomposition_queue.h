@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -98,8 +99,13 @@ class DecompositionQueue {
                                             const JobFilter& filter = {});
 
   /// Cancels a queued or running job. A job that has ended stays unchanged. The answer shows a
-  /// running job as still running; its watchers learn of its end. Errors: NotFound (JOB_NOT_FOUND).
-  absl::StatusOr<v1::Job> Cancel(const std::string& digest);
+  /// running job as still running; its watchers learn of its end. With `client`, the job goes on if
+  /// other clients have asked for it that have not cancelled it. A client that has not asked for
+  /// the job may only cancel it if nobody has since the queue was made. The transfer that follows a
+  /// model is asked for by those that want the model. Errors: NotFound (JOB_NOT_FOUND),
+  /// PermissionDenied (JOB_OF_ANOTHER).
+  absl::StatusOr<v1::Job> Cancel(const std::string& digest,
+                                 const std::optional<std::string>& client = std::nullopt);
 
   /// Calls `on_change` with the job at once and after every change, in order and one call at a
   /// time, until the job has ended. The calls are made on this thread or on a thread of the

@@ -11,6 +11,7 @@
 #include "server/decomposition/active_jobs.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/job_wishes.h"
 #include "server/decomposition/phase_usage.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
@@ -20,6 +21,7 @@ namespace carillon {
 /// The origin of a job, with the fields of ActiveJob that have the same names.
 struct JobOrigin {
   std::string client{};
+  JobWishes wishes{};
   std::string waits_for{};
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -55,7 +56,8 @@ class QueueCore {
   absl::StatusOr<v1::Job> Get(const std::string& digest);
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
                                             const JobFilter& filter);
-  absl::StatusOr<v1::Job> Cancel(const std::string& digest);
+  absl::StatusOr<v1::Job> Cancel(const std::string& digest,
+                                 const std::optional<std::string>& client);
   absl::Status DeleteModel(const std::string& digest);
   absl::Status Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
@@ -75,10 +77,11 @@ class QueueCore {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   absl::Status CheckAcceptable(const WantedJob& wanted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active,
-                                      const v1::CreateModalModelRequest& request)
+  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active, const WantedJob& wanted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   std::string StartCoarse(const WantedJob& fine, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  bool Withdraw(const ActiveJob& active, const std::string& client)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)

@@ -52,8 +52,7 @@ class SharedModelsApi : public ServedDaemon {
     v1::GetModalModelRequest request;
     request.set_name(name);
     v1::GetModalModelResponse response;
-    EXPECT_TRUE(
-        Call(*models, &v1::ModalModelService::Stub::GetModalModel, request, response).ok());
+    EXPECT_TRUE(Call(*models, &v1::ModalModelService::Stub::GetModalModel, request, response).ok());
     return response.modal_model();
   }
 
@@ -92,8 +91,7 @@ TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
   v1::UpdateModalModelResponse response;
   const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
   ASSERT_TRUE(Call(*models, update, pin, response).ok());
-  ExpectRefused(Import(*models, name, OtherRecords()), grpc::ALREADY_EXISTS,
-                "MODAL_MODEL_EXISTS");
+  ExpectRefused(Import(*models, name, OtherRecords()), grpc::ALREADY_EXISTS, "MODAL_MODEL_EXISTS");
   pin.set_pinned(false);
   ASSERT_TRUE(Call(*models, update, pin, response).ok());
   const int64_t revision = response.modal_model().revision();
