@@ -11,6 +11,7 @@
 #include "server/api/object_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
+#include "server/scene/sounding_object.h"
 
 namespace carillon {
 namespace {
@@ -154,6 +155,14 @@ absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
   return absl::OkStatus();
 }
 
+// Objects that name no material would all be refused with a material that does not fit the model.
+absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
+                                              const std::string& digest) {
+  ASSIGN_OR_RETURN(const ObjectProperties properties, ToObjectProperties(material, 1, 1));
+  ASSIGN_OR_RETURN(const auto model, database_.models().Find(digest));
+  return CheckSounds(*model, properties, daemon_.sample_rate_hz, &database_.transfers());
+}
+
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
                                        v1::UpdateModalModelResponse& response) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
@@ -162,7 +171,7 @@ absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& reques
   if (request.has_label()) change.label = request.label();
   if (request.has_pinned()) change.pinned = request.pinned();
   if (request.has_material()) {
-    RETURN_IF_ERROR(ResolveMaterial(request.material()).status());
+    RETURN_IF_ERROR(CheckMaterial(request.material(), digest));
     change.material = request.material();
   }
   ASSIGN_OR_RETURN(const ModelSummary summary, database_.models().Update(digest, change));

@@ -99,5 +99,29 @@ TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
   EXPECT_GT(Get(name).revision(), revision);
 }
 
+TEST_F(SharedModelsApi, AMaterialWithWhichTheModelCannotSoundIsRefused) {
+  const std::string scene = CreateScene();
+  v1::AddObjectRequest object = SmallObject(scene);
+  v1::UpdateModalModelRequest request;
+  request.set_name(object.modal_model());
+  *request.mutable_material() = object.material();
+  object.clear_material();
+  v1::UpdateModalModelResponse response;
+  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
+  ASSERT_TRUE(Call(*neighbours_, update, request, response).ok());
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(object, added).ok());
+
+  request.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio + 0.1);
+  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
+                "POISSON_RATIO_DIFFERS");
+  request.mutable_material()->clear_poisson_ratio();
+  request.mutable_material()->set_young_pa(5e-324);
+  request.mutable_material()->set_density_kg_per_m3(1e300);
+  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
+                "NO_MODE_IN_BAND");
+  EXPECT_TRUE(Add(object, added).ok()) << "it has the material from before";
+}
+
 }  // namespace
 }  // namespace carillon
