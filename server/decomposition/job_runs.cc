@@ -225,7 +225,9 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
     return true;
   }
   if (result.killed && !std::exchange(job.was_killed, true)) {
-    job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
+    if (result.verdict == Verdict::kOutOfMemory) {
+      job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
+    }
     settings_.log(absl::StrCat("jobs/", job.record.digest,
                                " is computed once more, because its process was killed"));
     return true;

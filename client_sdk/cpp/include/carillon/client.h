@@ -134,7 +134,8 @@ class Client {
   /// page size and the page token of `filter` are ignored.
   absl::StatusOr<std::vector<v1::Job>> ListJobs(const v1::ListJobsRequest& filter = {}) const;
 
-  /// Cancels a job that has not ended.
+  /// Cancels a job that has not ended. The job goes on as long as other clients want it that have
+  /// asked for it, too. Further errors: PERMISSION_DENIED (JOB_OF_ANOTHER).
   virtual absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
 
   /// Waits until a job ends and returns it if it has succeeded; if it has failed, returns the
