@@ -3,8 +3,8 @@
 
 namespace carillon {
 
-/// Whether what is stored may be replaced by something that has the same name and other content.
-/// What has changed on the disk may always be replaced.
+/// Whether a stored model or transfer may be replaced by one that has the same name and other
+/// content. A model or transfer that has changed on the disk may always be replaced.
 enum class Replacing {
   kAlways,        ///< by the result of a job
   kUnlessPinned,  ///< by an import of a caller that may also delete models
