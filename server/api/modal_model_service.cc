@@ -46,7 +46,10 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     v1::CreateModalModelResponse* response) {
   return Answer(
       context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
-        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client));
+        const auto check = [this](const std::string& model, const v1::Material& material) {
+          return MayRemember(model, material);
+        };
+        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check));
         return absl::OkStatus();
       });
 }
@@ -161,6 +164,16 @@ absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
   ASSIGN_OR_RETURN(const ObjectProperties properties, ToObjectProperties(material, 1, 1));
   ASSIGN_OR_RETURN(const auto model, database_.models().Find(digest));
   return CheckSounds(*model, properties, daemon_.sample_rate_hz, &database_.transfers());
+}
+
+// Another request for a stored model does not take away a material with which its objects sound.
+bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material) {
+  const auto known = database_.models().Material(digest);
+  if (!known.ok() || !known->has_value()) return true;
+  // A request that is repeated does not read the model.
+  if ((*known)->SerializeAsString() == material.SerializeAsString()) return true;
+  if (!absl::IsFailedPrecondition(CheckMaterial(material, digest))) return true;
+  return !CheckMaterial(**known, digest).ok();
 }
 
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,

@@ -65,6 +65,7 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
       grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response);
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
   absl::Status CheckMaterial(const v1::Material& material, const std::string& digest);
+  bool MayRemember(const std::string& digest, const v1::Material& material);
   absl::Status Update(const v1::UpdateModalModelRequest& request,
                       v1::UpdateModalModelResponse& response);
   absl::Status List(const v1::ListModalModelsRequest& request,

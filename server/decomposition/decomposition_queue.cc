@@ -59,8 +59,9 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelRequest& request,
-                                                   const std::string& client) {
-  return core_->Submit(request, client);
+                                                   const std::string& client,
+                                                   const MaterialCheck& check) {
+  return core_->Submit(request, client, check);
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(const std::string& model,

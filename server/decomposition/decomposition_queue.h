@@ -59,6 +59,9 @@ class DecompositionQueue {
 
   const QueueSettings& settings() const;
 
+  /// Returns whether a material may become the material of the objects that name none.
+  using MaterialCheck = std::function<bool(const std::string& model, const v1::Material& material)>;
+
   /// Requests the modal model of a mesh (ResolveRequest is applied). The job is in the database
   /// when the call returns. The job has succeeded at once if a stored model is complete up to the
   /// eigenvalue that the hints want; otherwise the model is computed again and replaced. If the job
@@ -66,9 +69,10 @@ class DecompositionQueue {
   /// reason that would recur, it is returned as failed. A job that failed by a crash, a stall, a
   /// time-out or a lack of memory is queued again. Errors: those of ResolveRequest, NotFound
   /// (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED). Clients, named by
-  /// `client`, take turns. A job that several clients ask for counts for the first of them.
+  /// `client`, take turns. A job that several clients ask for counts for the first of them. The
+  /// material of the request becomes the model's, unless there is a `check` that says no.
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
-                                 const std::string& client = {});
+                                 const std::string& client = {}, const MaterialCheck& check = {});
 
   /// Requests a transfer of the stored model `model`. The job has succeeded at once if a stored
   /// transfer satisfies the request. In all other respects the call works like Submit. Errors:

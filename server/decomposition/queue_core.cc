@@ -84,7 +84,8 @@ void QueueCore::Stop() {
 }
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request,
-                                          const std::string& client) {
+                                          const std::string& client,
+                                          const DecompositionQueue::MaterialCheck& check) {
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
   WantedJob wanted = WantedModel(resolved);
   wanted.client = client;
@@ -104,6 +105,7 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
       resolved.material().poisson_ratio() != poisson_ratio) {
     material.set_poisson_ratio(poisson_ratio);
   }
+  if (check && !check(wanted.digest, material)) return job;
   RETURN_IF_ERROR(database_.models().RememberMaterial(wanted.digest, material));
   return job;
 }

@@ -48,7 +48,8 @@ class QueueCore {
   void Stop();
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
-                                 const std::string& client);
+                                 const std::string& client,
+                                 const DecompositionQueue::MaterialCheck& check);
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request,
                                          const std::string& client);

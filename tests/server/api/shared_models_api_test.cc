@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/decomposition/decomposition_request.h"
 #include "tests/server/api/served_daemon.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
@@ -46,6 +47,24 @@ class SharedModelsApi : public ServedDaemon {
       records.emplace_back().set_transfer(record.SerializeAsString());
     }
     return records;
+  }
+
+  /// A request for a model, whose mesh is stored.
+  v1::CreateModalModelRequest RequestWithMesh() {
+    grpc::ClientContext context;
+    v1::UploadMeshResponse uploaded;
+    const auto upload = models->UploadMesh(&context, &uploaded);
+    v1::UploadMeshRequest mesh;
+    mesh.set_data("mesh");
+    upload->Write(mesh);
+    upload->WritesDone();
+    EXPECT_TRUE(upload->Finish().ok());
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_format("obj");
+    request.mutable_settings()->set_poisson_ratio(SmallModel()->poisson_ratio);
+    *request.mutable_material() = SmallMaterial();
+    return request;
   }
 
   v1::ModalModelSummary Get(const std::string& name) {
@@ -121,6 +140,23 @@ TEST_F(SharedModelsApi, AMaterialWithWhichTheModelCannotSoundIsRefused) {
   ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
                 "NO_MODE_IN_BAND");
   EXPECT_TRUE(Add(object, added).ok()) << "it has the material from before";
+}
+
+TEST_F(SharedModelsApi, ARequestDoesNotTakeAwayAMaterialWithWhichTheModelSounds) {
+  v1::CreateModalModelRequest request = RequestWithMesh();
+  const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
+  ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
+  v1::CreateModalModelResponse response;
+  const auto create = &v1::ModalModelService::Stub::CreateModalModel;
+  ASSERT_TRUE(Call(*models, create, request, response).ok());
+  const double young_pa = SmallMaterial().young_pa();
+  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
+  request.mutable_material()->set_young_pa(1e30 * young_pa);
+  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
+  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
+  request.mutable_material()->set_young_pa(1.1 * young_pa);
+  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
+  EXPECT_EQ(Get(name).material().young_pa(), 1.1 * young_pa);
 }
 
 }  // namespace
