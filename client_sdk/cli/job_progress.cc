@@ -141,7 +141,8 @@ std::string ProgressText(const v1::Job& job) {
 }
 
 std::string JobLine(const v1::Job& job, absl::Time now) {
-  const std::string reason = job.has_error() ? absl::StrCat(": ", job.error().reason()) : "";
+  const bool failed = job.state() == v1::JOB_STATE_FAILED;
+  const std::string reason = failed ? absl::StrCat(": ", job.error().reason()) : "";
   return absl::StrCat(ShortName(job), "  ", ProgressText(job), reason, AgeText(job, now), "  ",
                       EscapedText(job.label()));
 }

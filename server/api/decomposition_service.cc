@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -171,11 +172,15 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
       context, writing_, Role::kSubmit, [this, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
         ASSIGN_OR_RETURN(const v1::Job before, queue_.Get(digest));
-        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Cancel(digest));
-        // A job that has ended stays as it is, also if it ended between the two calls.
-        const v1::JobState state = response->job().state();
-        const bool ended = state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED;
-        if (HasEnded(before) || ended) return absl::OkStatus();
+        const bool for_all = caller.has(Role::kAdminister);
+        ASSIGN_OR_RETURN(
+            *response->mutable_job(),
+            queue_.Cancel(digest, for_all ? std::nullopt : std::optional(caller.client)));
+        // A job that has ended stays as it is, also if it ended between the two calls, and one that
+        // others want goes on.
+        if (HasEnded(before) || response->job().state() != v1::JOB_STATE_CANCELLED) {
+          return absl::OkStatus();
+        }
         writing_.events.LogCancelled(
             Event("job_cancelled").With("job", before.name()).WithSome("label", before.label()),
             caller);

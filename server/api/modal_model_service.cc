@@ -15,6 +15,7 @@
 #include "server/api/object_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
+#include "server/scene/sounding_object.h"
 
 namespace carillon {
 namespace {
@@ -77,7 +78,10 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     v1::CreateModalModelResponse* response) {
   return Answer(
       context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
-        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client));
+        const auto check = [this](const std::string& model, const v1::Material& material) {
+          return MayRemember(model, material);
+        };
+        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check));
         daemon_.writing.events.LogSubmitted(Submitted(response->job()), caller);
         return absl::OkStatus();
       });
@@ -145,8 +149,11 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::ImportModalModelRa
                                         caller](const Event& event) {
                   events.LogImported(event, caller);
                 };
-                return MakeImport(*context, *response, {database_, on_stored}, daemon_.writing.pool,
-                                  BoundsOf(std::move(place)));
+                // Who may delete a model may also replace it.
+                const Replacing replacing =
+                    caller.has(Role::kAdminister) ? Replacing::kUnlessPinned : Replacing::kNever;
+                return MakeImport(*context, *response, {database_, replacing, on_stored},
+                                  daemon_.writing.pool, BoundsOf(std::move(place)));
               });
 }
 
@@ -197,6 +204,24 @@ absl::Status ModalModelService::Get(const v1::GetModalModelRequest& request,
   return absl::OkStatus();
 }
 
+// Objects that name no material would all be refused with a material that does not fit the model.
+absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
+                                              const std::string& digest) {
+  ASSIGN_OR_RETURN(const ObjectProperties properties, ToObjectProperties(material, 1, 1));
+  ASSIGN_OR_RETURN(const auto model, database_.models().Find(digest));
+  return CheckSounds(*model, properties, daemon_.sample_rate_hz, &database_.transfers());
+}
+
+// Another request for a stored model does not take away a material with which its objects sound.
+bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material) {
+  const auto known = database_.models().Material(digest);
+  if (!known.ok() || !known->has_value()) return true;
+  // A request that is repeated does not read the model.
+  if ((*known)->SerializeAsString() == material.SerializeAsString()) return true;
+  if (!absl::IsFailedPrecondition(CheckMaterial(material, digest))) return true;
+  return !CheckMaterial(**known, digest).ok();
+}
+
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
                                        v1::UpdateModalModelResponse& response) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
@@ -205,7 +230,7 @@ absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& reques
   if (request.has_label()) change.label = request.label();
   if (request.has_pinned()) change.pinned = request.pinned();
   if (request.has_material()) {
-    RETURN_IF_ERROR(ResolveMaterial(request.material()).status());
+    RETURN_IF_ERROR(CheckMaterial(request.material(), digest));
     change.material = request.material();
   }
   ASSIGN_OR_RETURN(const ModelSummary summary, database_.models().Update(digest, change));

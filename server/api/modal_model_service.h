@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "server/api/call_bounds.h"
 #include "server/api/raw_service.h"
@@ -19,6 +21,7 @@ struct ModelContext {
   Reception writing;  ///< its pool runs the calls that change the database
   IdleCalls& idle_calls;
   const Clock& clock;
+  double sample_rate_hz = 0;  ///< of the daemon's sound
 };
 
 /// carillon.v1.ModalModelService. The objects that the constructor gets by reference must outlive
@@ -61,6 +64,8 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
   grpc::ServerReadReactor<grpc::ByteBuffer>* ImportModalModelRaw(
       grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response);
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
+  absl::Status CheckMaterial(const v1::Material& material, const std::string& digest);
+  bool MayRemember(const std::string& digest, const v1::Material& material);
   absl::Status Update(const v1::UpdateModalModelRequest& request,
                       v1::UpdateModalModelResponse& response);
   absl::Status List(const v1::ListModalModelsRequest& request,

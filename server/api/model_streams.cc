@@ -54,6 +54,7 @@ class ModelSink {
  public:
   explicit ModelSink(ImportTarget target)
       : database_(&target.database),
+        replacing_(target.replacing),
         log_event_(std::move(target.log_event)),
         transfers_(target.database.database()) {}
 
@@ -77,13 +78,17 @@ class ModelSink {
     RETURN_IF_ERROR(transfers_.ForEach(
         [](const StoredTransfer& transfer) { return CheckFigures(transfer.header()); }));
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
-    log_event_(Event("model_imported")
-                   .With("model", ModelName(summary.digest))
-                   .WithSome("label", summary.label)
-                   .With("modes", summary.header.mode_count())
-                   .With("bytes", summary.stored_bytes));
+    if (!import_->kept()) {
+      log_event_(Event("model_imported")
+                     .With("model", ModelName(summary.digest))
+                     .WithSome("label", summary.label)
+                     .With("modes", summary.header.mode_count())
+                     .With("bytes", summary.stored_bytes));
+    }
+    // A model that this call has stored takes any transfer.
+    const Replacing replacing = import_->kept() ? replacing_ : Replacing::kAlways;
     RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
-      return database_->transfers().Put(summary.digest, transfer).status();
+      return database_->transfers().Put(summary.digest, transfer, replacing).status();
     }));
     *response.mutable_modal_model() = ToProto(summary);
     return absl::OkStatus();
@@ -94,11 +99,13 @@ class ModelSink {
     if (import_) return absl::OkStatus();
     absl::string_view digest = first.name();
     absl::ConsumePrefix(&digest, "modalModels/");
-    ASSIGN_OR_RETURN(import_, database_->models().Import(std::string(digest), first.label()));
+    ASSIGN_OR_RETURN(import_,
+                     database_->models().Import(std::string(digest), first.label(), replacing_));
     return absl::OkStatus();
   }
 
   ModeDatabase* database_;
+  Replacing replacing_;
   EventSink log_event_;
   std::optional<ModelImport> import_;
   TransferSpool transfers_;

@@ -9,6 +9,7 @@
 #include "server/api/thread_pool.h"
 #include "server/base/event.h"
 #include "server/mode_database/mode_database.h"
+#include "server/mode_database/replacing.h"
 
 namespace carillon {
 
@@ -20,9 +21,11 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
                                                       MeshStore& meshes, ThreadPool& pool,
                                                       CallBounds bounds);
 
-/// The database into which a model is imported, and the log of the import.
+/// The database that takes an import, whether the import may replace a model of other content, and
+/// the log of what was imported.
 struct ImportTarget {
   ModeDatabase& database;
+  Replacing replacing;
   EventSink log_event;
 };
 

@@ -108,6 +108,11 @@ Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(Acti
   return Announce(job);
 }
 
+void ActiveJobs::AddWish(const std::string& digest, const std::string& client) {
+  MutexLock lock(&mutex_);
+  if (const auto job = jobs_.find(digest); job != jobs_.end()) job->second.wishes.Add(client);
+}
+
 Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
   MutexLock lock(&mutex_);
   const auto job = jobs_.find(digest);

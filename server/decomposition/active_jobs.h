@@ -20,6 +20,7 @@
 #include "server/decomposition/fair_queue.h"
 #include "server/decomposition/job_places.h"
 #include "server/decomposition/job_sink.h"
+#include "server/decomposition/job_wishes.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/job_store.h"
@@ -32,9 +33,10 @@ struct ActiveJob {
   v1::CreateModalModelRequest request;  ///< the request so far that reaches farthest
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
-  /// The client that asked for the job. It is empty if the job was asked for before the daemon
+  /// The client in whose queue the job is. It is empty if the job was asked for before the daemon
   /// started.
   std::string client{};
+  JobWishes wishes{};           ///< the clients that want the job
   std::string waits_for{};      ///< digest of the coarse model's job, until that job has ended
   bool coarse_ready = false;    ///< a coarse model is stored under the job's digest
   bool yields = false;          ///< its run is ended to make room, and repeated
@@ -86,6 +88,9 @@ class ActiveJobs {
 
   /// Applies `change` to a job. A waiting job moves to the place in the queue that it then has.
   Notice Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change);
+
+  /// Notes that a client, too, wants a job, if the job waits or runs.
+  void AddWish(const std::string& digest, const std::string& client);
 
   /// Removes a job. Its watchers get `last`.
   Notice Remove(const std::string& digest, const v1::Job& last);

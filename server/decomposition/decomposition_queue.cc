@@ -59,8 +59,9 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelRequest& request,
-                                                   const std::string& client) {
-  return core_->Submit(request, client);
+                                                   const std::string& client,
+                                                   const MaterialCheck& check) {
+  return core_->Submit(request, client, check);
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(const std::string& model,
@@ -81,8 +82,9 @@ absl::StatusOr<DecompositionJobPage> DecompositionQueue::List(int page_size,
   return core_->List(page_size, page_token, filter);
 }
 
-absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest) {
-  return core_->Cancel(digest);
+absl::StatusOr<v1::Job> DecompositionQueue::Cancel(const std::string& digest,
+                                                   const std::optional<std::string>& client) {
+  return core_->Cancel(digest, client);
 }
 
 absl::StatusOr<std::unique_ptr<JobWatch>> DecompositionQueue::Watch(

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,9 @@ class DecompositionQueue {
 
   const QueueSettings& settings() const;
 
+  /// Returns whether a material may become the material of the objects that name none.
+  using MaterialCheck = std::function<bool(const std::string& model, const v1::Material& material)>;
+
   /// Requests the modal model of a mesh (ResolveRequest is applied). The job is in the database
   /// when the call returns. The job has succeeded at once if a stored model is complete up to the
   /// eigenvalue that the hints want; otherwise the model is computed again and replaced. If the job
@@ -68,9 +72,10 @@ class DecompositionQueue {
   /// reason that would recur, it is returned as failed. A job that failed by a crash, a stall, a
   /// time-out or a lack of memory is queued again. Errors: those of ResolveRequest, NotFound
   /// (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED). Clients, named by
-  /// `client`, take turns. A job that several clients ask for counts for the first of them.
+  /// `client`, take turns. A job that several clients ask for counts for the first of them. The
+  /// material of the request becomes the model's, unless there is a `check` that says no.
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
-                                 const std::string& client = {});
+                                 const std::string& client = {}, const MaterialCheck& check = {});
 
   /// Requests a transfer of the stored model `model`. The job has succeeded at once if a stored
   /// transfer satisfies the request. In all other respects the call works like Submit. Errors:
@@ -101,8 +106,13 @@ class DecompositionQueue {
                                             const JobFilter& filter = {});
 
   /// Cancels a queued or running job. A job that has ended stays unchanged. The answer shows a
-  /// running job as still running; its watchers learn of its end. Errors: NotFound (JOB_NOT_FOUND).
-  absl::StatusOr<v1::Job> Cancel(const std::string& digest);
+  /// running job as still running; its watchers learn of its end. With `client`, the job goes on if
+  /// other clients have asked for it that have not cancelled it. A client that has not asked for
+  /// the job may only cancel it if nobody has since the queue was made. The transfer that follows a
+  /// model is asked for by those that want the model. Errors: NotFound (JOB_NOT_FOUND),
+  /// PermissionDenied (JOB_OF_ANOTHER).
+  absl::StatusOr<v1::Job> Cancel(const std::string& digest,
+                                 const std::optional<std::string>& client = std::nullopt);
 
   /// Calls `on_change` with the job at once and after every change, in order and one call at a
   /// time, until the job has ended. The calls are made on this thread or on a thread of the

@@ -32,8 +32,9 @@ struct Outcome {
   /// Set with kOutOfMemory if the worker kept to its own limit, but all workers together exceeded
   /// the budget. The task may succeed if it runs alone.
   bool crowded = false;
-  /// Set with kOutOfMemory if somebody else killed the worker. That was the system for lack of
-  /// memory, or a person by mistake, which cannot be told apart.
+  /// Set if somebody else ended the worker. With kOutOfMemory that was the system for lack of
+  /// memory, or a person by mistake, which cannot be told apart. With kCrashed it was a signal that
+  /// the system does not send for lack of memory.
   bool killed = false;
 };
 

@@ -18,6 +18,11 @@ bool IsOneOf(const std::string& reason, const std::array<const char*, N>& reason
   return std::ranges::find(reasons, reason) != reasons.end();
 }
 
+v1::ErrorInfo JobCancelled() {
+  return ToErrorInfo(Refusal(absl::StatusCode::kCancelled, "JOB_CANCELLED",
+                             "a caller cancelled the job: create the model again"));
+}
+
 }  // namespace
 
 v1::JobKind KindOf(const JobRecord& record) {
@@ -32,6 +37,7 @@ v1::Job ToJob(const JobRecord& record) {
   job.set_kind(KindOf(record));
   job.set_state(record.state);
   if (record.state == v1::JOB_STATE_FAILED) *job.mutable_error() = record.error;
+  if (record.state == v1::JOB_STATE_CANCELLED) *job.mutable_error() = JobCancelled();
   job.set_label(record.label);
   job.set_priority(record.priority);
   job.set_way(record.way);
@@ -79,8 +85,8 @@ bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& 
 }
 
 bool DependsOnWay(const Outcome& outcome) {
-  return IsOneOf<3>(outcome.error.reason(),
-                    {"WORKER_CRASHED", "WORKER_GARBAGE", "MESH_TETRAHEDRALIZATION_FAILED"});
+  return !outcome.killed && IsOneOf<3>(outcome.error.reason(), {"WORKER_CRASHED", "WORKER_GARBAGE",
+                                                                "MESH_TETRAHEDRALIZATION_FAILED"});
 }
 
 bool IsDeterministic(const Outcome& outcome) {

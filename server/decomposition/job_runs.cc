@@ -80,6 +80,7 @@ void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request, Job
   jobs_.Add({.record = std::move(record),
              .request = std::move(request),
              .client = std::move(origin.client),
+             .wishes = std::move(origin.wishes),
              .waits_for = std::move(origin.waits_for),
              .coarse_ready = coarse_ready,
              .guess_bytes = guess_bytes});
@@ -95,13 +96,18 @@ void JobRuns::FollowByTransfer(const ActiveJob& model) {
   WantedJob wanted = WantedTransfer(model.record.digest, *model.running);
   if (jobs_.Contains(wanted.digest)) {
     // It runs on an older revision of the model.
-    jobs_.Change(wanted.digest, [](ActiveJob& job) { job.again = job.running.has_value(); });
+    jobs_.Change(wanted.digest, [&model](ActiveJob& job) {
+      job.again = job.running.has_value();
+      job.wishes.Add(model.wishes);
+    });
     return;
   }
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
   const absl::Status stored = database_.jobs().Put(record);
   if (!stored.ok()) return settings_.log(std::string(stored.message()));
-  Enqueue(std::move(record), std::move(wanted.request), {.client = model.client});
+  JobOrigin origin{.client = model.client};
+  origin.wishes.Add(model.wishes);
+  Enqueue(std::move(record), std::move(wanted.request), std::move(origin));
 }
 
 void JobRuns::StartWhatFits(Notices& notices) {
@@ -229,7 +235,9 @@ bool JobRuns::RunsAgain(ActiveJob& job, const Outcome& result) const {
     return true;
   }
   if (result.killed && !std::exchange(job.was_killed, true)) {
-    job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
+    if (result.verdict == Verdict::kOutOfMemory) {
+      job.estimate_bytes = std::max(2 * job.estimate_bytes, result.peak_bytes * 3 / 2);
+    }
     settings_.log(absl::StrCat("jobs/", job.record.digest,
                                " is computed once more, because its process was killed"));
     return true;

@@ -13,6 +13,7 @@
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/job_events.h"
+#include "server/decomposition/job_wishes.h"
 #include "server/decomposition/phase_usage.h"
 #include "server/decomposition/watcher.h"
 #include "server/mode_database/mode_database.h"
@@ -22,6 +23,7 @@ namespace carillon {
 /// The origin of a job, with the fields of ActiveJob that have the same names.
 struct JobOrigin {
   std::string client{};
+  JobWishes wishes{};
   std::string waits_for{};
 };
 

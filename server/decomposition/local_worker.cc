@@ -32,9 +32,7 @@ constexpr size_t kLogBytes = 4 << 10;
 constexpr uint64_t kFreeEventBytes = 1 << 20;
 constexpr uint64_t kEventBytesPerS = 64 << 10;
 
-int64_t Seconds(nanoseconds time) {
-  return std::chrono::duration_cast<std::chrono::seconds>(time).count();
-}
+double Seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
 v1::ErrorInfo OutOfMemory(absl::string_view what) {
   return InternalError(
@@ -48,6 +46,18 @@ std::string WouldNeed(uint32_t node_count) {
   if (node_count == 0) return "";
   return absl::StrCat(" (with its ", node_count, " nodes it would need about ",
                       MemoryOfNodes(node_count) >> 20U, " MiB)");
+}
+
+// Signals that a process gets from others only, and not by a fault of its own.
+bool ComesFromOutside(int signal) {
+  return signal == SIGTERM || signal == SIGINT || signal == SIGHUP || signal == SIGQUIT;
+}
+
+v1::ErrorInfo EndedFromOutside(int signal) {
+  return InternalError(
+      "WORKER_CRASHED",
+      absl::StrCat("the decomposing process was ended by signal ", signal,
+                   " from outside: see who ends processes of this user, and try again"));
 }
 
 // The log may hold any bytes; a message is one line of text.
@@ -220,6 +230,11 @@ Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
     Outcome outcome{Verdict::kOutOfMemory,
                     OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
                     {}};
+    outcome.killed = true;
+    return outcome;
+  }
+  if (!end.exited && ComesFromOutside(end.status)) {
+    Outcome outcome{Verdict::kCrashed, EndedFromOutside(end.status), {}};
     outcome.killed = true;
     return outcome;
   }

@@ -2,7 +2,6 @@
 #include "server/decomposition/queue_core.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
+#include "server/decomposition/queue_refusals.h"
 #include "server/decomposition/stored_model.h"
 
 namespace carillon {
@@ -21,26 +21,6 @@ namespace {
 
 // A daemon that was killed this often while a job ran may have been killed because of the job.
 constexpr uint32_t kMostStarts = 10;
-
-absl::Status NotFound(const std::string& digest) {
-  return Refusal(absl::StatusCode::kNotFound, "JOB_NOT_FOUND",
-                 absl::StrCat("no job is named jobs/", digest, ": create the modal model again"));
-}
-
-absl::Status QueueFull(size_t count, double retry_after_s) {
-  const int64_t seconds = std::max<int64_t>(1, std::llround(retry_after_s));
-  absl::Status status =
-      Refusal(absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
-              absl::StrCat(count, " decompositions wait already: try again in ", seconds, " s"));
-  AddFigure(status, "retry_after_s", absl::StrCat(seconds));
-  return status;
-}
-
-absl::Status ClientQueueFull(size_t count, size_t whole) {
-  return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
-                 absl::StrCat(count, " decompositions of this client wait already, its share of ",
-                              whole, ": wait until some have run"));
-}
 
 /// The filter for the stored states: running jobs are stored as queued ones.
 JobFilter AsStored(JobFilter filter) {
@@ -103,7 +83,8 @@ void QueueCore::Stop() {
 }
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request,
-                                          const std::string& client) {
+                                          const std::string& client,
+                                          const DecompositionQueue::MaterialCheck& check) {
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
   WantedJob wanted = WantedModel(resolved);
   wanted.client = client;
@@ -123,6 +104,7 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
       resolved.material().poisson_ratio() != poisson_ratio) {
     material.set_poisson_ratio(poisson_ratio);
   }
+  if (check && !check(wanted.digest, material)) return job;
   RETURN_IF_ERROR(database_.models().RememberMaterial(wanted.digest, material));
   return job;
 }
@@ -144,7 +126,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitTransfer(const std::string& model,
 
 absl::StatusOr<v1::Job> QueueCore::SubmitAny(const WantedJob& wanted, Notices& notices) {
   const std::optional<ActiveJob> active = jobs_.Find(wanted.digest);
-  return active.has_value() ? SubmitAgain(*active, wanted.request) : SubmitNew(wanted, notices);
+  return active.has_value() ? SubmitAgain(*active, wanted) : SubmitNew(wanted, notices);
 }
 
 // The model of a request is stored: its transfer is asked for, too. Without room in the queue the
@@ -181,6 +163,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
     return ended;
   }
   runs_.Enqueue(std::move(record), request, {.client = client, .waits_for = std::move(coarse)});
+  jobs_.AddWish(digest, client);
   runs_.StartWhatFits(notices);
   return Get(digest);
 }
@@ -206,7 +189,9 @@ std::string QueueCore::StartCoarse(const WantedJob& fine, Notices& notices) {
   const auto coarse = CoarseRequest(request, mesh.ok() ? mesh->byte_count : 0);
   if (!coarse.has_value()) return "";
   std::string coarse_digest = RequestDigest(*coarse);
-  if (!jobs_.Contains(coarse_digest)) {
+  if (jobs_.Contains(coarse_digest)) {
+    jobs_.AddWish(coarse_digest, fine.client);
+  } else {
     WantedJob wanted = WantedModel(*coarse);
     wanted.client = fine.client;
     SubmitNew(wanted, notices).status().IgnoreError();
@@ -218,12 +203,14 @@ std::string QueueCore::StartCoarse(const WantedJob& fine, Notices& notices) {
 
 // A job that waits or runs serves all requests for its digest: it is extended up to the highest
 // eigenvalue that any of them wants.
-absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active,
-                                               const v1::CreateModalModelRequest& request) {
-  const std::string& digest = active.record.digest;
+absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active, const WantedJob& wanted) {
+  const std::string& digest = wanted.digest;
+  const v1::CreateModalModelRequest& request = wanted.request;
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
   const bool farther = WantsMore(request, active.request);
   const bool sooner = request.priority() > active.record.priority;
+  jobs_.AddWish(active.waits_for, wanted.client);
+  if (!wanted_no_more) jobs_.AddWish(digest, wanted.client);
   if (!wanted_no_more && !farther && !sooner) return Get(digest);
   JobRecord record = active.record;
   record.state = v1::JOB_STATE_QUEUED;
@@ -236,6 +223,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active,
                 job.record = std::move(record);
                 if (wanted_no_more || farther) job.request = request;
                 job.again = job.again || wanted_no_more;
+                job.wishes.Add(wanted.client);
               })
       .job;
 }
@@ -301,13 +289,29 @@ absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::s
   }
 }
 
-absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
+// Returns whether other clients still want the job. The job then counts for one of them.
+bool QueueCore::Withdraw(const ActiveJob& active, const std::string& client) {
+  const std::string other = active.wishes.OtherThan(client);
+  if (other.empty()) return false;
+  jobs_.Change(active.record.digest, [&](ActiveJob& job) {
+    job.wishes.Withdraw(client);
+    if (job.client == client) job.client = other;
+  });
+  return true;
+}
+
+absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest,
+                                          const std::optional<std::string>& client) {
   Notices notices;
   JobRecord record;
   {
     MutexLock lock(&runs_.writer());
     const std::optional<ActiveJob> active = jobs_.Find(digest);
     if (!active.has_value()) return FindStored(digest);
+    if (client.has_value()) {
+      RETURN_IF_ERROR(active->wishes.CheckCancel(digest, *client));
+      if (Withdraw(*active, *client)) return Get(digest);
+    }
     // The worker ends first, because the database may take a while.
     if (active->running.has_value()) runs_.Cancel(digest);
     record = active->record;
@@ -319,6 +323,7 @@ absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest) {
                   [&](ActiveJob& job) {
                     job.record = record;
                     job.again = false;
+                    job.wishes.Clear();
                   })
           .job;
     }
@@ -351,6 +356,7 @@ void QueueCore::Drop(const std::string& digest, Notices& notices) {
     job.record.state = v1::JOB_STATE_CANCELLED;
     job.deleted = true;
     job.again = false;
+    job.wishes.Clear();
   });
 }
 
@@ -382,7 +388,7 @@ void QueueCore::Forget(const std::string& digest, const std::shared_ptr<Watcher>
 
 absl::StatusOr<v1::Job> QueueCore::FindStored(const std::string& digest) {
   ASSIGN_OR_RETURN(const std::optional<JobRecord> record, database_.jobs().Find(digest));
-  if (!record.has_value()) return NotFound(digest);
+  if (!record.has_value()) return JobNotFound(digest);
   return ToJob(*record);
 }
 

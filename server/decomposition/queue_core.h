@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -47,7 +48,8 @@ class QueueCore {
   void Stop();
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
-                                 const std::string& client);
+                                 const std::string& client,
+                                 const DecompositionQueue::MaterialCheck& check);
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request,
                                          const std::string& client);
@@ -55,7 +57,8 @@ class QueueCore {
   absl::StatusOr<v1::Job> Get(const std::string& digest);
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
                                             const JobFilter& filter);
-  absl::StatusOr<v1::Job> Cancel(const std::string& digest);
+  absl::StatusOr<v1::Job> Cancel(const std::string& digest,
+                                 const std::optional<std::string>& client);
   absl::Status DeleteModel(const std::string& digest);
   absl::Status Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
   void Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher);
@@ -75,10 +78,11 @@ class QueueCore {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   absl::Status CheckAcceptable(const WantedJob& wanted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active,
-                                      const v1::CreateModalModelRequest& request)
+  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active, const WantedJob& wanted)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   std::string StartCoarse(const WantedJob& fine, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  bool Withdraw(const ActiveJob& active, const std::string& client)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)

@@ -9,11 +9,11 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/base/physical_memory.h"
 #include "server/base/sha256.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/model_codec.h"
+#include "server/mode_database/model_import.h"
 #include "server/mode_database/model_sql.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/spool_file.h"
@@ -49,70 +49,7 @@ ModelSummary Named(const std::string& digest, const std::string& label) {
   return summary;
 }
 
-/// A model is read into memory whole when it sounds.
-absl::Status CheckSize(uint64_t array_bytes) {
-  const uint64_t most_bytes = PhysicalBytes() / 2;
-  if (array_bytes <= most_bytes) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
-                 absl::StrCat("the arrays of the model have ", array_bytes,
-                              " bytes; half of the "
-                              "memory here is ",
-                              most_bytes,
-                              ": keep fewer modes, or a coarser "
-                              "surface"));
-}
-
-absl::Status CheckModeCount(uint32_t mode_count) {
-  if (mode_count <= kMaxImportedModeCount) return absl::OkStatus();
-  return Refusal(
-      absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
-      absl::StrCat("the model has ", mode_count, " modes; at most ", kMaxImportedModeCount,
-                   " are taken, of which an object sounds with 800: keep fewer"));
-}
-
-absl::Status CheckHeaderSize(size_t header_bytes) {
-  if (header_bytes <= kMaxHeaderBytes) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
-                 absl::StrCat("the header of the model has ", header_bytes, " bytes; at most ",
-                              kMaxHeaderBytes, " are taken: shorten its warnings"));
-}
-
 }  // namespace
-
-struct ModelImport::State {
-  ModelStore& store;
-  SpoolFile file;
-  ModelSummary summary;
-  ModelChecker checker;
-  Sha256 sha;
-};
-
-ModelImport::ModelImport(std::unique_ptr<State> state) : state_(std::move(state)) {}
-ModelImport::ModelImport(ModelImport&&) noexcept = default;
-ModelImport& ModelImport::operator=(ModelImport&&) noexcept = default;
-ModelImport::~ModelImport() = default;
-
-absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
-  if (record.has_header()) RETURN_IF_ERROR(CheckHeaderSize(record.header().ByteSizeLong()));
-  RETURN_IF_ERROR(state_->checker.Check(record));
-  if (record.has_header()) {
-    RETURN_IF_ERROR(CheckSize(state_->checker.array_bytes()));
-    RETURN_IF_ERROR(CheckModeCount(record.header().mode_count()));
-  }
-  const std::string bytes = Delimited(record);
-  state_->sha.Update(bytes);
-  return state_->file.Append(bytes);
-}
-
-absl::StatusOr<ModelSummary> ModelImport::Finish() {
-  RETURN_IF_ERROR(state_->checker.Finish());
-  if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
-  const auto open = [&file = state_->file]() -> absl::StatusOr<ModelFileReader> {
-    RETURN_IF_ERROR(file.Rewind());
-    return ModelFileReader(file.descriptor());
-  };
-  return state_->store.Store(open, state_->summary);
-}
 
 absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
   if (!header_sent_) {
@@ -164,12 +101,18 @@ absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Statu
 }
 
 absl::StatusOr<ModelSummary> ModelStore::Store(
-    absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open, ModelSummary named) {
+    absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open, ModelSummary named,
+    Replacing replacing, bool* kept) {
   named.created_unix_ms = clock_->UnixMs();
   ModelSummary summary;
   RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
-    ASSIGN_OR_RETURN(ModelFileReader records, open());
     summary = named;
+    if (replacing != Replacing::kAlways) {
+      ASSIGN_OR_RETURN(ModelFileReader sent, open());
+      ASSIGN_OR_RETURN(*kept, IsStored(connection, sent, replacing, summary));
+      if (*kept) return absl::OkStatus();
+    }
+    ASSIGN_OR_RETURN(ModelFileReader records, open());
     return InsertModel(connection, records, summary);
   }));
   if (budget_.bytes > 0) CollectBeyondBudget(summary.digest);
@@ -180,7 +123,8 @@ absl::StatusOr<ModelSummary> ModelStore::PutFile(const std::string& digest,
                                                  const std::string& label,
                                                  const std::filesystem::path& file) {
   RETURN_IF_ERROR(CheckName(digest));
-  return Store([&] { return ModelFileReader::Open(file); }, Named(digest, label));
+  return Store([&] { return ModelFileReader::Open(file); }, Named(digest, label),
+               Replacing::kAlways, nullptr);
 }
 
 absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string& to,
@@ -196,12 +140,12 @@ absl::Status ModelStore::CopyIfAbsent(const std::string& from, const std::string
   });
 }
 
-absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest,
-                                               const std::string& label) {
+absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest, const std::string& label,
+                                               Replacing replacing) {
   if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;
   ASSIGN_OR_RETURN(SpoolFile file, database_->MakeSpool());
   return ModelImport(std::make_unique<ModelImport::State>(
-      ModelImport::State{*this, std::move(file), Named(digest, label), {}, {}}));
+      ModelImport::State{*this, std::move(file), Named(digest, label), replacing}));
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {

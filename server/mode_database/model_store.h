@@ -22,6 +22,7 @@
 #include "server/base/event.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/modal_model.h"
+#include "server/mode_database/replacing.h"
 
 namespace carillon {
 
@@ -121,9 +122,14 @@ class ModelImport {
   /// (MODAL_MODEL_CORRUPT: a hash is wrong), ResourceExhausted (MODAL_MODEL_TOO_LARGE).
   absl::Status Append(const v1::ModalModelRecord& record);
 
-  /// Stores the model durably, and replaces a model of the same digest. Must be the last call.
-  /// Errors: InvalidArgument (MODAL_MODEL_MALFORMED: records are missing).
+  /// Stores the model durably. No record may follow. If a model with the same records is stored
+  /// under the same digest, the stored model is returned, and nothing is changed. Errors:
+  /// InvalidArgument (MODAL_MODEL_MALFORMED: records are missing), AlreadyExists
+  /// (MODAL_MODEL_EXISTS: the stored model has other records and may not be replaced).
   absl::StatusOr<ModelSummary> Finish();
+
+  /// Returns whether Finish has found the same model stored.
+  bool kept() const;
 
  private:
   friend class ModelStore;
@@ -192,8 +198,10 @@ class ModelStore {
                             const std::string& label);
 
   /// Begins an import. If `digest` is empty, the model is named by the SHA-256 of its file.
-  /// Errors: InvalidArgument (INVALID_NAME: not a digest).
-  absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label);
+  /// `replacing` says whether the import may replace a model of other content. Errors:
+  /// InvalidArgument (INVALID_NAME: not a digest).
+  absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label,
+                                     Replacing replacing = Replacing::kNever);
 
   /// Begins an export. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
   absl::StatusOr<ModelExport> Export(const std::string& digest);
@@ -254,8 +262,9 @@ class ModelStore {
                                         size_t most);
   /// Deletes models until the others keep to the budget, and logs that. Spares `newest`.
   void CollectBeyondBudget(const std::string& newest);
+  /// Sets `kept` if the same model is stored already, which is not looked for with kAlways.
   absl::StatusOr<ModelSummary> Store(absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
-                                     ModelSummary named);
+                                     ModelSummary named, Replacing replacing, bool* kept);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
   bool InMemory(const std::string& digest) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
   /// Sets the time at which the model sounded last, if that is not stored yet.

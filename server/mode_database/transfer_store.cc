@@ -103,6 +103,29 @@ absl::Status Insert(SqliteConnection& connection, int64_t revision, const Stored
        SqlBlob{header}, SqlBlob{transfer.bytes()}});
 }
 
+/// Returns whether the transfer is stored, byte for byte. Errors: AlreadyExists
+/// (MODAL_MODEL_EXISTS: it is not, and `replacing` does not let it be stored).
+absl::StatusOr<bool> IsTransferStored(SqliteConnection& connection, const ModelSummary& model,
+                                      const StoredTransfer& transfer, Replacing replacing) {
+  if (replacing == Replacing::kAlways) return false;
+  std::optional<StoredTransfer> stored;
+  ASSIGN_OR_RETURN(const std::vector<TransferRow> rows, SelectRows(connection, model.revision));
+  for (const TransferRow& row : rows) {
+    if (row.step != SpeedStep(transfer.header().speed_ratio())) continue;
+    ASSIGN_OR_RETURN(stored, ReadRow(connection, model.revision, row));
+  }
+  if (stored.has_value() && stored->bytes() == transfer.bytes()) return true;
+  const bool replaces = stored.has_value() && model.pinned;
+  if (replacing == Replacing::kUnlessPinned && !replaces) return false;
+  return Refusal(
+      absl::StatusCode::kAlreadyExists, "MODAL_MODEL_EXISTS",
+      absl::StrCat("modalModels/", model.digest, " is stored already without this transfer of ",
+                   transfer.header().speed_ratio(),
+                   " times the speed of sound in air: import the model without transfers and ask "
+                   "for them with CreateTransfer, or let a caller with the role administer ",
+                   replaces ? "unpin the model and import it" : "import it"));
+}
+
 }  // namespace
 
 int64_t SpeedStep(double speed_ratio) { return std::llround(100 * std::log(speed_ratio)); }
@@ -113,14 +136,16 @@ void TransferStore::Listen(OnStored on_stored) {
 }
 
 absl::StatusOr<TransferSummary> TransferStore::Put(const std::string& model_digest,
-                                                   const StoredTransfer& transfer) {
+                                                   const StoredTransfer& transfer,
+                                                   Replacing replacing) {
   const TransferSummary summary{.header = transfer.header(),
                                 .stored_bytes = transfer.bytes().size(),
                                 .created_unix_ms = clock_->UnixMs()};
   RETURN_IF_ERROR(database_->Write([&](SqliteConnection& connection) {
     ASSIGN_OR_RETURN(const ModelSummary model, SelectModel(connection, model_digest));
     RETURN_IF_ERROR(CheckModes(connection, model, transfer));
-    return Insert(connection, model.revision, transfer, summary);
+    ASSIGN_OR_RETURN(const bool stored, IsTransferStored(connection, model, transfer, replacing));
+    return stored ? absl::OkStatus() : Insert(connection, model.revision, transfer, summary);
   }));
   MutexLock lock(&listener_mutex_);
   if (on_stored_) on_stored_(model_digest);

@@ -17,6 +17,7 @@
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/modal_model.h"
+#include "server/mode_database/replacing.h"
 #include "server/mode_database/transfer.h"
 #include "server/mode_database/transfer_codec.h"
 
@@ -58,11 +59,15 @@ class TransferStore {
   /// called again.
   void Listen(OnStored on_stored);
 
-  /// Stores a transfer of the model durably; replaces a transfer with the same step number. Errors:
-  /// NotFound (MODAL_MODEL_NOT_FOUND), InvalidArgument (TRANSFER_MALFORMED: its modes are not the
-  /// model's).
+  /// Stores a transfer of the model durably; replaces a transfer with the same step number. Without
+  /// kAlways, a transfer that is stored already, byte for byte, is left as it is. With
+  /// kUnlessPinned, a pinned model keeps the transfers that it has, but may get others; with kNever
+  /// a model gets no transfer that it does not have. Errors: NotFound (MODAL_MODEL_NOT_FOUND),
+  /// InvalidArgument (TRANSFER_MALFORMED: its modes are not the model's), AlreadyExists
+  /// (MODAL_MODEL_EXISTS: refused by `replacing`).
   absl::StatusOr<TransferSummary> Put(const std::string& model_digest,
-                                      const StoredTransfer& transfer);
+                                      const StoredTransfer& transfer,
+                                      Replacing replacing = Replacing::kAlways);
 
   /// Stores the transfer in a file, as Put does. Further errors: those of StoredTransfer::ReadFile.
   absl::StatusOr<TransferSummary> PutFile(const std::string& model_digest,

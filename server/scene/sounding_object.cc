@@ -90,11 +90,16 @@ std::optional<HeardDirectivity> DirectivityOf(const std::shared_ptr<const Transf
                           .near_field = voice->hearing().near_field};
 }
 
+/// Returns whether the acceleration of the body sounds, too, and not only its modes.
+bool Clicks(const Transfer* transfer, const ObjectProperties& properties) {
+  return transfer != nullptr && transfer->rigid &&
+         properties.radiation != RadiationModel::kModesOnly;
+}
+
 /// Returns the body whose acceleration sounds, or nothing if only its modes sound.
 std::optional<MovedBody> MovedBodyOf(const Transfer* transfer, const SoundingBody& body,
                                      const ObjectProperties& properties) {
-  if (transfer == nullptr || !transfer->rigid) return std::nullopt;
-  if (properties.radiation == RadiationModel::kModesOnly) return std::nullopt;
+  if (!Clicks(transfer, properties)) return std::nullopt;
   return MovedBody{.body = *transfer->rigid,
                    .density_kg_per_m3 = properties.material.density_kg_per_m3,
                    .size = properties.material.size,
@@ -113,6 +118,18 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
   constexpr double kRounding = 1e-6;
   if (complete_hz >= top_hz * (1 - kRounding)) return std::nullopt;
   return complete_hz;
+}
+
+/// Returns the modes with which an object sounds. A small hard body whose modes are all too high to
+/// be heard may still click. Errors: FailedPrecondition (NO_MODE_IN_BAND).
+absl::StatusOr<SoundingModes> SelectModes(const ModalModel& model,
+                                          const ObjectProperties& properties,
+                                          const Transfer* transfer, double sample_rate_hz,
+                                          const SoundingBand& band) {
+  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer)};
+  SoundingModes sounding = SelectSoundingModes(table, properties.material, sample_rate_hz, band);
+  if (!sounding.modes.empty() || Clicks(transfer, properties)) return sounding;
+  return NoModeInBand(model, properties.material, band);
 }
 
 double LowestHz(const std::vector<SoundingMode>& modes) {
@@ -139,6 +156,13 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
                               " m/s: ask for it with CreateTransfer and let its job succeed"));
 }
 
+absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& properties,
+                         double sample_rate_hz, TransferStore* transfers) {
+  RETURN_IF_ERROR(Check(model, properties));
+  ASSIGN_OR_RETURN(const auto transfer, ChooseTransfer(model, properties, transfers));
+  return SelectModes(model, properties, transfer.get(), sample_rate_hz, {}).status();
+}
+
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
                                                   const ObjectProperties& properties,
                                                   const MixerBus& output,
@@ -151,21 +175,17 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                    ChooseTransfer(model, properties, transfers));
   auto directivity = DirectivityOf(transfer, voice.get(), properties.material.size);
   const SoundingBand band{.directed = directivity.has_value()};
-  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer.get())};
-  const SoundingModes sounding =
-      SelectSoundingModes(table, properties.material, settings.sample_rate_hz, band);
-  auto moved = MovedBodyOf(transfer.get(), *body, properties);
-  const bool clicks = moved.has_value();
-  // A small hard body whose modes are all too high to be heard still clicks.
-  if (sounding.modes.empty() && !clicks) return NoModeInBand(model, properties.material, band);
+  ASSIGN_OR_RETURN(const SoundingModes sounding,
+                   SelectModes(model, properties, transfer.get(), settings.sample_rate_hz, band));
   auto oscillators = std::make_unique<OscillatorBank>(
       sounding, body->shapes,
       OscillatorBankSettings{.sample_rate_hz = settings.sample_rate_hz,
                              .block_frame_count = settings.block_frame_count,
                              .gain = properties.gain * kFullScalePa / settings.full_scale_pa,
                              .directivity = std::move(directivity),
-                             .moved = std::move(moved)});
+                             .moved = MovedBodyOf(transfer.get(), *body, properties)});
   ASSIGN_OR_RETURN(const BankId bank, output.mixer.Add(std::move(oscillators), voice, output.bus));
+  const bool clicks = Clicks(transfer.get(), properties);
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
                         .properties = properties,

@@ -62,6 +62,11 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
                                                                const ObjectProperties& properties,
                                                                TransferStore* transfers);
 
+/// Checks that an object of the model with these properties would sound at this sampling rate.
+/// Errors: those of MakeSoundingObject, except TOO_MANY_OBJECTS.
+absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& properties,
+                         double sample_rate_hz, TransferStore* transfers);
+
 /// A bus of a mixer.
 struct MixerBus {
   Mixer& mixer;

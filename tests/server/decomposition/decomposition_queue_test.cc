@@ -165,6 +165,14 @@ TEST_F(DecompositionQueueTest, AWorkerThatIsKilledTwiceLacksMemory) {
   EXPECT_EQ(RunCount(), 2U);
 }
 
+TEST_F(DecompositionQueueTest, AWorkerThatIsEndedFromOutsideTwiceFailsButNotForEver) {
+  MakeQueue(absl::StrCat(kCount, "kill -TERM $$"));
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");
+  EXPECT_EQ(RunCount(), 2U) << "no other way of computing";
+  MakeQueue(kSucceed);
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+}
+
 TEST_F(DecompositionQueueTest, ACrashInEveryWayIsRememberedAcrossARestart) {
   MakeQueue(absl::StrCat(kCount, "kill -SEGV $$"));
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");
@@ -242,7 +250,9 @@ TEST_F(DecompositionQueueTest, CancelEndsAQueuedJobAtOnceAndARunningOneSoon) {
   const auto watch = Watch(running, first);
   first.Await(v1::JOB_STATE_RUNNING);
   const v1::Job queued = Submit(Request(20'000, 2));
-  EXPECT_EQ(queue_->Cancel(DigestOf(queued))->state(), v1::JOB_STATE_CANCELLED);
+  const v1::Job cancelled = *queue_->Cancel(DigestOf(queued));
+  EXPECT_EQ(cancelled.state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_EQ(cancelled.error().reason(), "JOB_CANCELLED");
   EXPECT_TRUE(queue_->Cancel(DigestOf(running)).ok());
   EXPECT_EQ(first.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
   EXPECT_EQ(queue_->Cancel(DigestOf(running))->state(), v1::JOB_STATE_CANCELLED);

@@ -19,6 +19,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr std::chrono::seconds kDeadline(30);
 
@@ -164,6 +165,15 @@ TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("segment 7 is   bad"));
 }
 
+TEST_F(LocalExecutorTest, ASignalFromOutsideIsNoFaultOfTheMesh) {
+  const Outcome outcome = RunScript("kill -TERM $$");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
+  EXPECT_THAT(outcome.error.message(), HasSubstr("ended by signal 15 from outside"));
+  EXPECT_THAT(outcome.error.message(), Not(HasSubstr("mesh")));
+}
+
 TEST_F(LocalExecutorTest, AnExitStatusWithoutAReasonIsACrash) {
   const Outcome outcome = RunScript("exit 3");
   EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
@@ -193,7 +203,9 @@ TEST_F(LocalExecutorTest, TheRequestsOwnLimitsBindWhereTheyAreLower) {
 
 TEST_F(LocalExecutorTest, TheRequestsTimeLimitBinds) {
   request_.set_time_limit_s(0.2);
-  EXPECT_EQ(RunScript("sleep 1000").verdict, Verdict::kTimeout);
+  const Outcome outcome = RunScript("sleep 1000");
+  EXPECT_EQ(outcome.verdict, Verdict::kTimeout);
+  EXPECT_THAT(outcome.error.message(), HasSubstr("more than its 0.2 s"));
 }
 
 TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {

@@ -108,7 +108,8 @@ class Client {
 
   /// Stores the model whose records `send` passes to the sink that it is given. If `send` returns
   /// an error, this error is returned and nothing is stored. `name` is "modalModels/{digest}"; if
-  /// it is empty, the daemon names the model after its content.
+  /// it is empty, the daemon names the model after its content. Further errors: ALREADY_EXISTS
+  /// (MODAL_MODEL_EXISTS: another model has that name, see ModalModelService.ImportModalModel).
   virtual absl::StatusOr<v1::ModalModelSummary> ImportModalModel(
       const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
       const std::string& label) const;
@@ -139,7 +140,8 @@ class Client {
   /// page size and the page token of `filter` are ignored.
   absl::StatusOr<std::vector<v1::Job>> ListJobs(const v1::ListJobsRequest& filter = {}) const;
 
-  /// Cancels a job that has not ended.
+  /// Cancels a job that has not ended. The job goes on as long as other clients want it that have
+  /// asked for it, too. Further errors: PERMISSION_DENIED (JOB_OF_ANOTHER).
   virtual absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
 
   /// Waits until a job ends and returns it if it has succeeded; if it has failed, returns the

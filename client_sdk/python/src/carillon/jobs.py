@@ -94,7 +94,8 @@ class Job:
         self.message = message
 
     def cancel(self) -> None:
-        """Cancels the job; one that has ended stays as it is."""
+        """Cancels the job for this client; it goes on as long as another client wants it that has asked for it, too.
+        One that has ended stays as it is."""
         request = decomposition_service_pb2.CancelJobRequest(name=self.name)
         with errors.translated(self._client.server):
             self.message = self._client.jobs_stub.CancelJob(request).job

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/decomposition/decomposition_request.h"
+#include "tests/server/api/served_daemon.h"
+#include "tests/server/mode_database/sample_transfer.h"
+
+namespace carillon {
+namespace {
+
+/// A daemon with two clients. The one over the Unix socket has every role. The one over TCP, the
+/// neighbour, has the role submit but not the role administer.
+class SharedModelsApi : public ServedDaemon {
+ protected:
+  SharedModelsApi() : ServedDaemon({.client_share = 1}, {"127.0.0.1:0"}) {}
+
+  static grpc::Status Import(v1::ModalModelService::Stub& stub, const std::string& name,
+                             const std::vector<v1::ModalModelRecord>& records) {
+    grpc::ClientContext context;
+    v1::ImportModalModelResponse response;
+    const auto writer = stub.ImportModalModel(&context, &response);
+    v1::ImportModalModelRequest request;
+    request.set_name(name);
+    for (const v1::ModalModelRecord& record : records) {
+      *request.mutable_record() = record;
+      writer->Write(request);
+    }
+    writer->WritesDone();
+    return writer->Finish();
+  }
+
+  static std::vector<v1::ModalModelRecord> OtherRecords() {
+    ModalModel other = *SmallModel();
+    for (double& eigenvalue : other.eigenvalues) eigenvalue *= 2;
+    return SampleRecords(other);
+  }
+
+  static std::vector<v1::ModalModelRecord> WithTransfer(std::vector<v1::ModalModelRecord> records) {
+    const std::vector<float> integrals(SmallModel()->mode_count(), 1);
+    for (const v1::TransferRecord& record :
+         SampleTransfer(*SmallModel(), {.power_integrals = integrals}).Records()) {
+      records.emplace_back().set_transfer(record.SerializeAsString());
+    }
+    return records;
+  }
+
+  /// A request for a model, whose mesh is stored.
+  v1::CreateModalModelRequest RequestWithMesh() {
+    grpc::ClientContext context;
+    v1::UploadMeshResponse uploaded;
+    const auto upload = models->UploadMesh(&context, &uploaded);
+    v1::UploadMeshRequest mesh;
+    mesh.set_data("mesh");
+    upload->Write(mesh);
+    upload->WritesDone();
+    EXPECT_TRUE(upload->Finish().ok());
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_format("obj");
+    request.mutable_settings()->set_poisson_ratio(SmallModel()->poisson_ratio);
+    *request.mutable_material() = SmallMaterial();
+    return request;
+  }
+
+  v1::ModalModelSummary Get(const std::string& name) {
+    v1::GetModalModelRequest request;
+    request.set_name(name);
+    v1::GetModalModelResponse response;
+    EXPECT_TRUE(Call(*models, &v1::ModalModelService::Stub::GetModalModel, request, response).ok());
+    return response.modal_model();
+  }
+
+  std::unique_ptr<v1::ModalModelService::Stub> neighbours_ = v1::ModalModelService::NewStub(
+      grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials()));
+};
+
+TEST_F(SharedModelsApi, AClientCannotReplaceTheModelOfOthers) {
+  const std::string name = ImportSmallModel();
+  const v1::ModalModelSummary before = Get(name);
+  ExpectRefused(Import(*neighbours_, name, OtherRecords()), grpc::ALREADY_EXISTS,
+                "MODAL_MODEL_EXISTS");
+  EXPECT_TRUE(Import(*neighbours_, name, SampleRecords(*SmallModel())).ok()) << "the same model";
+  const v1::ModalModelSummary after = Get(name);
+  EXPECT_EQ(after.revision(), before.revision());
+  EXPECT_EQ(after.eigenvalues(0), before.eigenvalues(0));
+  EXPECT_TRUE(Import(*neighbours_, "", OtherRecords()).ok()) << "under a name of its own";
+}
+
+TEST_F(SharedModelsApi, AClientCannotGiveTheModelOfOthersATransfer) {
+  const std::string name = ImportSmallModel();
+  const auto records = WithTransfer(SampleRecords(*SmallModel()));
+  ExpectRefused(Import(*neighbours_, name, records), grpc::ALREADY_EXISTS, "MODAL_MODEL_EXISTS");
+  EXPECT_EQ(Get(name).transfers_size(), 0);
+  EXPECT_TRUE(Import(*neighbours_, "", WithTransfer(SampleRecords(*SmallModel()))).ok())
+      << "a model of its own brings its transfers";
+  EXPECT_TRUE(Import(*models, name, records).ok()) << "by a caller that may administer";
+  EXPECT_EQ(Get(name).transfers_size(), 1);
+}
+
+TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
+  const std::string name = ImportSmallModel();
+  v1::UpdateModalModelRequest pin;
+  pin.set_name(name);
+  pin.set_pinned(true);
+  v1::UpdateModalModelResponse response;
+  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
+  ASSERT_TRUE(Call(*models, update, pin, response).ok());
+  ExpectRefused(Import(*models, name, OtherRecords()), grpc::ALREADY_EXISTS, "MODAL_MODEL_EXISTS");
+  pin.set_pinned(false);
+  ASSERT_TRUE(Call(*models, update, pin, response).ok());
+  const int64_t revision = response.modal_model().revision();
+  EXPECT_TRUE(Import(*models, name, OtherRecords()).ok());
+  EXPECT_GT(Get(name).revision(), revision);
+}
+
+TEST_F(SharedModelsApi, AMaterialWithWhichTheModelCannotSoundIsRefused) {
+  const std::string scene = CreateScene();
+  v1::AddObjectRequest object = SmallObject(scene);
+  v1::UpdateModalModelRequest request;
+  request.set_name(object.modal_model());
+  *request.mutable_material() = object.material();
+  object.clear_material();
+  v1::UpdateModalModelResponse response;
+  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
+  ASSERT_TRUE(Call(*neighbours_, update, request, response).ok());
+  v1::AddObjectResponse added;
+  ASSERT_TRUE(Add(object, added).ok());
+
+  request.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio + 0.1);
+  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
+                "POISSON_RATIO_DIFFERS");
+  request.mutable_material()->clear_poisson_ratio();
+  request.mutable_material()->set_young_pa(5e-324);
+  request.mutable_material()->set_density_kg_per_m3(1e300);
+  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
+                "NO_MODE_IN_BAND");
+  EXPECT_TRUE(Add(object, added).ok()) << "it has the material from before";
+}
+
+TEST_F(SharedModelsApi, ARequestDoesNotTakeAwayAMaterialWithWhichTheModelSounds) {
+  v1::CreateModalModelRequest request = RequestWithMesh();
+  const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
+  ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
+  v1::CreateModalModelResponse response;
+  const auto create = &v1::ModalModelService::Stub::CreateModalModel;
+  ASSERT_TRUE(Call(*models, create, request, response).ok());
+  const double young_pa = SmallMaterial().young_pa();
+  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
+  request.mutable_material()->set_young_pa(1e30 * young_pa);
+  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
+  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
+  request.mutable_material()->set_young_pa(1.1 * young_pa);
+  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
+  EXPECT_EQ(Get(name).material().young_pa(), 1.1 * young_pa);
+}
+
+}  // namespace
+}  // namespace carillon
