@@ -22,7 +22,7 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContex
                                                       CallBounds bounds);
 
 /// The database that takes an import, whether the import may replace a model of other content, and
-/// the log of what was imported.
+/// the log of the stored models.
 struct ImportTarget {
   ModeDatabase& database;
   Replacing replacing;
