@@ -210,7 +210,7 @@ Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
 
 absl::Status JobRuns::PutResult(const JobRecord& job, const std::filesystem::path& file) {
   if (!job.transfer_of.empty()) {
-    const absl::Status stored = database_.transfers().PutFile(job.transfer_of, file).status();
+    absl::Status stored = database_.transfers().PutFile(job.transfer_of, file).status();
     if (stored.ok()) events_.LogTransfer(job);
     return stored;
   }

@@ -203,7 +203,7 @@ absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnecti
     return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
                           {std::to_string(++change_count)});
   };
-  const absl::Status status =
+  absl::Status status =
       files_.Change([&] { return InTransaction(writer, "BEGIN IMMEDIATE", change); });
   RememberFailure(status);
   if (!status.ok()) return status;

@@ -17,7 +17,7 @@ namespace {
 
 /// A guarded mapping. The signal handler reads it without a lock.
 struct Mapping {
-  std::atomic<uintptr_t> begin{0};
+  std::atomic<char*> begin{nullptr};
   std::atomic<size_t> byte_count{0};
   std::atomic<std::atomic<bool>*> truncated{nullptr};  ///< null if the entry is free
 };
@@ -28,14 +28,14 @@ Mutex mappings_mutex;
 bool handles_signal ABSL_GUARDED_BY(mappings_mutex) = false;
 
 /// Puts a page of zeros at an address of a guarded mapping. Returns false for other addresses.
-bool PutPage(uintptr_t address) {
+bool PutPage(char* address) {
   for (const Mapping& mapping : mappings) {
     std::atomic<bool>* const truncated = mapping.truncated.load();
-    const uintptr_t begin = mapping.begin;
+    char* const begin = mapping.begin;
     if (truncated == nullptr || address < begin || address >= begin + mapping.byte_count) continue;
     truncated->store(true);
     const auto page_bytes = static_cast<uintptr_t>(sysconf(_SC_PAGESIZE));
-    void* const page = reinterpret_cast<void*>(address / page_bytes * page_bytes);
+    char* const page = address - reinterpret_cast<uintptr_t>(address) % page_bytes;
     return mmap(page, page_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED,
                 -1, 0) == page;
   }
@@ -45,7 +45,7 @@ bool PutPage(uintptr_t address) {
 extern "C" void HandleBusError(int signal_number, siginfo_t* info, void* /*context*/) {
   const int saved_errno = errno;
   // Without a handler the access, made again, ends the process.
-  if (!PutPage(reinterpret_cast<uintptr_t>(info->si_addr))) signal(signal_number, SIG_DFL);
+  if (!PutPage(static_cast<char*>(info->si_addr))) signal(signal_number, SIG_DFL);
   errno = saved_errno;
 }
 
@@ -60,7 +60,7 @@ void HandleSignal() {
 }  // namespace
 
 void MappingGuard::Guard(volatile void* begin, size_t byte_count) {
-  const auto address = reinterpret_cast<uintptr_t>(begin);
+  auto* const address = static_cast<char*>(const_cast<void*>(begin));
   const MutexLock lock(&mappings_mutex);
   if (!handles_signal) HandleSignal();
   handles_signal = true;
