@@ -5,6 +5,7 @@ import collections
 import os
 import pathlib
 import re
+import resource
 import signal
 import statistics
 import subprocess
@@ -34,7 +35,7 @@ GROWTH_PER_HOUR = 0.01
 LONG_ENOUGH_S = 600
 NOISE_MIB = 0.5
 
-Sample = collections.namedtuple("Sample", "time_s mib descriptors threads")
+Sample = collections.namedtuple("Sample", "time_s mib file_mib descriptors threads")
 
 
 class Churn:
@@ -81,7 +82,9 @@ def slope_per_hour(samples):
 class ChurnTest(torture.ServedTest):
     def sample(self):
         process = pathlib.Path("/proc", str(self.daemon.process.pid))
-        return Sample(time.monotonic(), torture.resident_mib(self.daemon.process),
+        resident, shared = (int(text) * resource.getpagesize() / 2**20
+                            for text in (process / "statm").read_text().split()[1:3])
+        return Sample(time.monotonic(), resident, shared,
                       len(os.listdir(process / "fd")), len(os.listdir(process / "task")))
 
     def metrics(self):
@@ -151,7 +154,7 @@ class ChurnTest(torture.ServedTest):
             print(f"{self.lives} lives, {self.deaths} deaths without a word; memory amid the clients "
                   f"{statistics.median(sample.mib for sample in parts[-1]):.1f} MiB, at most "
                   f"{max(sample.mib for sample in parts[-1]):.1f}; at rest {rests[-1].mib:.1f}, of which "
-                  f"{self.allocated_mib():.2f} are allocated", flush=True)
+                  f"{rests[-1].file_mib:.2f} are of files, {self.allocated_mib():.2f} allocated", flush=True)
         self.check_counts(before, parts, rests[-1])
         self.check_memory(before, rests)
         self.assertGreater(self.lives, CLIENTS)
