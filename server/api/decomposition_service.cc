@@ -176,11 +176,11 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
         ASSIGN_OR_RETURN(
             *response->mutable_job(),
             queue_.Cancel(digest, for_all ? std::nullopt : std::optional(caller.client)));
-        // A job that has ended stays as it is, also if it ended between the two calls, and one that
-        // others want goes on.
-        if (HasEnded(before) || response->job().state() != v1::JOB_STATE_CANCELLED) {
-          return absl::OkStatus();
-        }
+        // Neither call changes a job that has ended. A running job that the second call cancels is
+        // still shown as running.
+        const v1::JobState state = response->job().state();
+        const bool ended = state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED;
+        if (HasEnded(before) || ended) return absl::OkStatus();
         writing_.events.LogCancelled(
             Event("job_cancelled").With("job", before.name()).WithSome("label", before.label()),
             caller);

@@ -28,8 +28,8 @@ constexpr size_t kMostIdleReaders = 4;
 // pragma is a write, and a reader would wait for the writer. Changes go from the log into the file
 // whenever the log exceeds 4 MiB, so that little is lost with a log that somebody removes after a
 // crash. While a backup is being made, the log grows, and after it shrinks to 16 MiB again.
-// Debian's SQLite overwrites what is deleted with zeros, for which a full disk has no space in the
-// log; with secure_delete = FAST a deletion writes no page for that alone.
+// Debian's SQLite overwrites deleted rows with zeros, and a full disk has no space in the log for
+// these pages; with secure_delete = FAST a deletion writes no page for that alone.
 constexpr char kWriter[] =
     "PRAGMA page_size = 65536; PRAGMA auto_vacuum = INCREMENTAL; PRAGMA wal_autocheckpoint = 64; "
     "PRAGMA journal_size_limit = 16777216; PRAGMA secure_delete = FAST;";

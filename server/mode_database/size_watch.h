@@ -19,7 +19,7 @@ namespace carillon {
 class WrittenSize {
  public:
   /// `index` guards the mapping of the log's index. Once that was truncated, no file is whole,
-  /// because SQLite no longer knows what is in the log.
+  /// because SQLite then no longer knows the pages of the log.
   explicit WrittenSize(const MappingGuard& index) : index_(index) {}
 
   /// Notes that SQLite has opened a file of `byte_count` bytes.

@@ -69,7 +69,7 @@ absl::Status ToStatus(const SQLite::Exception& error) {
                      absl::StrCat("the database cannot be opened or written (", what,
                                   "): see that this user may write in its folder"));
     case SQLITE_IOERR:
-      // The file of shared memory is made as large as it is needed, unless the disk is full.
+      // SQLite could not enlarge its -shm file, because the disk is full.
       if (error.getExtendedErrorCode() == SQLITE_IOERR_SHMSIZE) return Full(what);
       return Refusal(absl::StatusCode::kUnavailable, "DATABASE_IO_ERROR",
                      absl::StrCat("the disk under the database fails (", what,

@@ -60,7 +60,7 @@ class TransferStore {
   void Listen(OnStored on_stored);
 
   /// Stores a transfer of the model durably; replaces a transfer with the same step number. Without
-  /// kAlways, a transfer that is stored already, byte for byte, is left as it is. With
+  /// kAlways, a transfer that is the same byte for byte as the stored one changes nothing. With
   /// kUnlessPinned, a pinned model keeps the transfers that it has, but may get others; with kNever
   /// a model gets no transfer that it does not have. Errors: NotFound (MODAL_MODEL_NOT_FOUND),
   /// InvalidArgument (TRANSFER_MALFORMED: its modes are not the model's), AlreadyExists

@@ -13,9 +13,9 @@
 namespace carillon::client {
 
 /// A file that appears under its name only when it is complete. Until then its bytes are in a file
-/// beside it that only this user may read and write (mode 0600), and a file that had the name
-/// before stays as it is. The bytes of devices, pipes and paths in /dev and /proc are written to
-/// them at once.
+/// beside it that only this user may read and write (mode 0600), and an older file
+/// of the name stays unchanged. Devices, pipes and paths in /dev and /proc get their bytes at
+/// once.
 class WholeFile {
  public:
   /// Begins to write the file. If `path` is a symbolic link, the file to which the link points is
@@ -23,7 +23,7 @@ class WholeFile {
   /// is the database of a daemon, or belongs to such a database).
   static absl::StatusOr<WholeFile> Create(const std::string& path);
 
-  /// Removes what was written, unless Publish has succeeded.
+  /// Removes the bytes that were written, unless Publish has succeeded.
   ~WholeFile();
   WholeFile(WholeFile&& other) noexcept;
   WholeFile& operator=(WholeFile&&) = delete;
