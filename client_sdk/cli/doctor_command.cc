@@ -127,9 +127,9 @@ void CheckDatabase(const client::Client& daemon, bool serves, Findings& findings
         "database",
         "carillon.v1.ModalModelService is NOT_SERVING, because the database cannot be changed; the "
         "daemon's log says why. If the disk is full or fails, or another process holds the "
-        "database, remedy that. If the database's file or its -wal file was removed, replaced or "
-        "truncated, stop the daemon, put the file back or run `carillond db restore`, and start "
-        "the daemon again");
+        "database, remedy that. If the database's file or its -wal file was removed, replaced, "
+        "truncated or overwritten, stop the daemon, put the file back or run `carillond db "
+        "restore`, and start the daemon again");
   }
   const auto stats = daemon.GetDatabaseStats();
   if (absl::IsPermissionDenied(stats.status()) || absl::IsUnauthenticated(stats.status())) {

@@ -39,7 +39,7 @@ std::filesystem::path CountOf(const std::filesystem::path& file) {
 }  // namespace
 
 bool DatabaseFiles::IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                            WrittenSize& size) {
+                            WrittenFile& size) {
   bool is_same = false;
   const bool has_all = size.IsWhole([&]() -> int64_t {
     struct stat status {};
@@ -62,7 +62,7 @@ absl::Status DatabaseFiles::Check() {
   sizes_.database().Close();
   sizes_.log().Close();
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
-                 absl::StrCat("somebody removed, replaced or truncated ", file_.string(),
+                 absl::StrCat("somebody removed, replaced, truncated or overwrote ", file_.string(),
                               " or its -wal file while the daemon ran, so that nothing can be "
                               "stored any more: stop the daemon, put the files back or run "
                               "carillond db restore, and start it again"));

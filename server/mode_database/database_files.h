@@ -12,22 +12,23 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "server/base/mutex.h"
-#include "server/mode_database/size_watch.h"
+#include "server/mode_database/write_watch.h"
 
 namespace carillon {
 
 /// Watches a database file and its write-ahead log, because SQLite itself goes on writing to files
-/// that somebody has removed, replaced or truncated. Safe from every thread.
+/// that somebody has removed, replaced, truncated or overwritten. Safe from every thread.
 class DatabaseFiles {
  public:
   explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
 
   /// Name of the VFS through which the connection that writes must be opened, and which tells this
-  /// object how large SQLite has made the files. That connection must be closed first.
+  /// object what SQLite has written to the files. That connection must be closed first.
   const std::string& vfs_name() const { return sizes_.vfs_name(); }
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than SQLite has made it, or the -shm file was truncated). Once a function of
+  /// or is smaller than SQLite has made it, or a write has found that its first bytes are not
+  /// those that SQLite wrote, or the -shm file was truncated). Once a function of
   /// this object has returned DATABASE_LOST, all later calls return it. The first call remembers
   /// which files they are, and must follow the first write.
   absl::Status Check();
@@ -45,10 +46,10 @@ class DatabaseFiles {
     ino_t inode = 0;
   };
   static bool IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                      WrittenSize& size);
+                      WrittenFile& size);
 
   const std::filesystem::path file_;
-  SizeWatch sizes_;
+  WriteWatch sizes_;
   Mutex mutex_;
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);

@@ -116,6 +116,37 @@ TEST_F(DatabaseFilesTest, ALogThatIsTruncatedAmidAChangeIsLost) {
   });
 }
 
+/// Writes bytes over the beginning of a file that stays the same file, as `cp` does.
+void Overwrite(const std::filesystem::path& file, const std::string& bytes) {
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+}
+
+TEST_F(DatabaseFilesTest, AfterALargerDatabaseWasCopiedOverTheFileNothingIsAcknowledged) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(StoreMuch(*(*Database::Open(folder / "carillon.db")), [] {}).ok());
+  const std::string larger = ReadBytes(folder / "carillon.db");
+  Open();  // the log has gone into the file
+  ASSERT_GT(larger.size(), std::filesystem::file_size(file_));
+  Overwrite(file_, larger);
+  Database& database = database_->database();
+  EXPECT_THAT(StoreMuch(database, [] {}).ToString(), HasSubstr("DATABASE_LOST: "));
+  EXPECT_THAT(Put("new").ToString(), HasSubstr("DATABASE_LOST: "));
+  database_.reset();
+  EXPECT_EQ(ReadBytes(file_), larger);
+}
+
+TEST_F(DatabaseFilesTest, AfterTheLogWasOverwrittenInPlaceNothingIsAcknowledged) {
+  ExpectLost([&] { Overwrite(log_, std::string(std::filesystem::file_size(log_), '\0')); });
+}
+
+TEST_F(DatabaseFilesTest, FilesThatAreTouchedAreNotLost) {
+  for (const std::filesystem::path& file : {file_, log_}) {
+    std::filesystem::last_write_time(file, std::filesystem::file_time_type::clock::now());
+    EXPECT_TRUE(StoreMuch(database_->database(), [] {}).ok());
+  }
+}
+
 TEST_F(DatabaseFilesTest, ADatabaseThatWasLostAndDamagedDoesNotOpen) {
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
   Open();  // the log has gone into the file

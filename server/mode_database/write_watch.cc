@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/size_watch.h"
+#include "server/mode_database/write_watch.h"
 
 #include <sqlite3.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
+#include <iterator>
+#include <optional>
+#include <string>
 
 #include "absl/strings/str_cat.h"
 
@@ -16,10 +20,10 @@ std::string NewName() {
   return absl::StrCat("carillon-", ++count);
 }
 
-/// A file of SQLite whose size is watched. SQLite's own file lies behind it in memory.
+/// A file of SQLite that is watched. SQLite's own file lies behind it in memory.
 struct WatchedFile {
   sqlite3_file base;
-  WrittenSize* size;
+  WrittenFile* written;
   MappingGuard* index;
 };
 
@@ -27,7 +31,7 @@ sqlite3_file& Real(sqlite3_file* file) {
   return *reinterpret_cast<sqlite3_file*>(reinterpret_cast<WatchedFile*>(file) + 1);
 }
 
-WrittenSize& SizeOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->size; }
+WrittenFile& WrittenOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->written; }
 
 /// Calls a method of SQLite's own file.
 template <auto kMethod, typename... Arguments>
@@ -37,11 +41,11 @@ auto Forward(sqlite3_file* file, Arguments... arguments) {
 }
 
 int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) {
-  return SizeOf(file).Write(Real(file), data, size, offset);
+  return WrittenOf(file).Write(Real(file), data, size, offset);
 }
 
 int Truncate(sqlite3_file* file, sqlite3_int64 size) {
-  return SizeOf(file).Truncate(Real(file), size);
+  return WrittenOf(file).Truncate(Real(file), size);
 }
 
 MappingGuard& IndexOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->index; }
@@ -90,48 +94,83 @@ int64_t SizeNow(sqlite3_file& file) {
   return told ? byte_count : INT64_MAX;
 }
 
-}  // namespace
+constexpr int64_t kHeadBytes = 100;
 
-void WrittenSize::Open(int64_t byte_count) {
-  const MutexLock lock(&mutex_);
-  byte_count_ = byte_count;
+/// Returns a file's first bytes, or nothing if they cannot be read.
+std::optional<std::string> HeadNow(sqlite3_file& file, int64_t byte_count) {
+  std::string head(byte_count, '\0');
+  const int result = file.pMethods->xRead(&file, head.data(), static_cast<int>(byte_count), 0);
+  if (result != SQLITE_OK && result != SQLITE_IOERR_SHORT_READ) return std::nullopt;
+  return head;
 }
 
-bool WrittenSize::IsWhole(absl::FunctionRef<int64_t()> look) {
+}  // namespace
+
+void WrittenFile::Open(sqlite3_file& file) {
+  const MutexLock lock(&mutex_);
+  byte_count_ = SizeNow(file);
+  ReadHead(file);
+}
+
+void WrittenFile::ReadHead(sqlite3_file& file) {
+  head_ = HeadNow(file, std::min(SizeNow(file), kHeadBytes)).value_or("");
+}
+
+/// A file that cannot be read counts as unchanged, because what SQLite does next fails by itself.
+bool WrittenFile::HasHead(sqlite3_file& file) {
+  const MutexLock lock(&mutex_);
+  lost_ = lost_ || HeadNow(file, std::ssize(head_)).value_or(head_) != head_;
+  return !lost_;
+}
+
+void WrittenFile::NoteHead(const void* data, int size, int64_t offset) {
+  if (offset >= kHeadBytes) return;
+  const int64_t end = std::min(offset + size, kHeadBytes);
+  head_.resize(std::max<size_t>(head_.size(), end), '\0');
+  std::memcpy(head_.data() + offset, data, end - offset);
+}
+
+bool WrittenFile::IsWhole(absl::FunctionRef<int64_t()> look) {
   const MutexLock lock(&mutex_);
   lost_ = lost_ || index_.was_truncated() || look() < byte_count_;
   return !lost_;
 }
 
-void WrittenSize::Close() {
+void WrittenFile::Close() {
   const MutexLock lock(&mutex_);
   lost_ = true;
 }
 
-int WrittenSize::Write(sqlite3_file& file, const void* data, int size, int64_t offset) {
-  if (!IsWhole([&file] { return SizeNow(file); })) return SQLITE_IOERR_WRITE;
+int WrittenFile::Write(sqlite3_file& file, const void* data, int size, int64_t offset) {
+  if (!IsWhole([&file] { return SizeNow(file); }) || !HasHead(file)) return SQLITE_IOERR_WRITE;
   const int result = file.pMethods->xWrite(&file, data, size, offset);
-  if (result != SQLITE_OK) return result;
   const MutexLock lock(&mutex_);
+  if (result != SQLITE_OK) {
+    // A part of the data may have been written.
+    if (offset < kHeadBytes) ReadHead(file);
+    return result;
+  }
   byte_count_ = std::max<int64_t>(byte_count_, offset + size);
+  NoteHead(data, size, offset);
   return result;
 }
 
-int WrittenSize::Truncate(sqlite3_file& file, int64_t byte_count) {
+int WrittenFile::Truncate(sqlite3_file& file, int64_t byte_count) {
   // Under the lock, IsWhole sees the new size of the file together with the new count.
   const MutexLock lock(&mutex_);
   if (lost_ || index_.was_truncated()) return SQLITE_IOERR_TRUNCATE;
   byte_count_ = std::min(byte_count_, byte_count);
+  head_.resize(std::min<size_t>(head_.size(), byte_count));
   return file.pMethods->xTruncate(&file, byte_count);
 }
 
-int64_t WrittenSize::byte_count() const {
+int64_t WrittenFile::byte_count() const {
   const MutexLock lock(&mutex_);
   return byte_count_;
 }
 
-struct SizeWatch::Layer {
-  explicit Layer(SizeWatch& watch)
+struct WriteWatch::Layer {
+  explicit Layer(WriteWatch& watch)
       : real(*sqlite3_vfs_find(nullptr)),
         vfs(real),
         database(watch.database_),
@@ -157,22 +196,22 @@ struct SizeWatch::Layer {
     file->pMethods = nullptr;
     const int result = layer.real.xOpen(&layer.real, name, &real, flags, opened);
     if (real.pMethods == nullptr) return result;
-    WrittenSize& size = is_database ? layer.database : layer.log;
+    WrittenFile& written = is_database ? layer.database : layer.log;
     file->pMethods = &kWatched;
-    reinterpret_cast<WatchedFile*>(file)->size = &size;
+    reinterpret_cast<WatchedFile*>(file)->written = &written;
     reinterpret_cast<WatchedFile*>(file)->index = &layer.index;
-    if (result == SQLITE_OK) size.Open(SizeNow(real));
+    if (result == SQLITE_OK) written.Open(real);
     return result;
   }
 
   sqlite3_vfs& real;
   sqlite3_vfs vfs;
-  WrittenSize& database;
-  WrittenSize& log;
+  WrittenFile& database;
+  WrittenFile& log;
   MappingGuard& index;
 };
 
-SizeWatch::SizeWatch() : name_(NewName()), layer_(std::make_unique<Layer>(*this)) {}
-SizeWatch::~SizeWatch() = default;
+WriteWatch::WriteWatch() : name_(NewName()), layer_(std::make_unique<Layer>(*this)) {}
+WriteWatch::~WriteWatch() = default;
 
 }  // namespace carillon
