@@ -86,6 +86,14 @@ absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& p
   return directory;
 }
 
+std::filesystem::path DataDirectory::database_file() const {
+  std::filesystem::path file = path_ / kDatabaseName;
+  std::error_code error;
+  if (!std::filesystem::is_symlink(file, error)) return file;
+  std::filesystem::path target = std::filesystem::weakly_canonical(file, error);
+  return error ? file : target;
+}
+
 DataDirectory::DataDirectory(std::filesystem::path path, int folder, int file)
     : path_(std::move(path)), folder_(folder), file_(file) {}
 

@@ -28,7 +28,9 @@ class DataDirectory {
   DataDirectory(DataDirectory&& other) noexcept;
   DataDirectory& operator=(DataDirectory&&) = delete;
 
-  std::filesystem::path database_file() const { return path_ / kDatabaseName; }
+  /// Returns the database file. If it is a symbolic link, returns the file to which it leads,
+  /// beside which SQLite has the log.
+  std::filesystem::path database_file() const;
   /// The folder for the files of running decompositions in the data folder `path`.
   static std::filesystem::path WorkDirectory(const std::filesystem::path& path) {
     return path / "work";

@@ -235,13 +235,13 @@ absl::Status Run(Options options, const ReadOptions& read_options, const StopGua
                options, read_options, guard);
 }
 
-/// Prints what a database has, if it can be read.
-void PrintContents(const std::filesystem::path& file) {
-  const auto database = Database::Open(file);
-  const auto stats = database.ok() ? ReadStats(**database) : database.status();
-  if (!stats.ok()) return;
-  std::cout << "models: " << stats->model_count << ", meshes: " << stats->mesh_count
-            << ", jobs: " << stats->job_count << std::endl;
+/// Prints what a database has.
+absl::Status PrintContents(const std::filesystem::path& file) {
+  ASSIGN_OR_RETURN(const auto database, Database::Open(file));
+  ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(*database));
+  std::cout << "models: " << stats.model_count << ", meshes: " << stats.mesh_count
+            << ", jobs: " << stats.job_count << std::endl;
+  return absl::OkStatus();
 }
 
 /// Says how many faults a check or a repair has found.
@@ -253,15 +253,13 @@ absl::Status Conclude(int finding_count, absl::string_view outcome) {
 
 absl::Status Check(const std::filesystem::path& file, const OnFinding& on_finding) {
   RETURN_IF_ERROR(CheckDatabase(file, on_finding));
-  PrintContents(file);
-  return absl::OkStatus();
+  return PrintContents(file);
 }
 
 /// Prints what the database has now, and where the old one is.
 absl::Status Report(const std::filesystem::path& file, const std::filesystem::path& kept) {
-  PrintContents(file);
   if (!kept.empty()) std::cout << "the old database is kept as " << kept.string() << std::endl;
-  return absl::OkStatus();
+  return PrintContents(file);
 }
 
 /// Logs an error, and returns the exit status that belongs to it.

@@ -8,7 +8,9 @@
 #include <string_view>
 #include <system_error>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
@@ -26,19 +28,6 @@
 
 namespace carillon {
 namespace {
-
-absl::Status CannotCopy(const std::filesystem::path& file, const std::error_code& error) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat(file.string(), " cannot be copied (", error.message(),
-                              "): see that this user may read it, and write in the data folder"));
-}
-
-void Remove(const std::filesystem::path& file) {
-  std::error_code ignored;
-  for (const char* suffix : {"", "-wal", "-shm", "-count"}) {
-    std::filesystem::remove(file.string() + suffix, ignored);
-  }
-}
 
 // Transfers that have changed on the disk are left out: they can be computed again.
 absl::Status CopyTransfers(Database& from, Database& to, const std::string& model_digest) {
@@ -101,7 +90,13 @@ absl::Status CopyJob(Database& from, Database& to, const std::string& digest) {
   return JobStore(to).Put(*job);
 }
 
-// A full disk ends the repair; a damaged row is only left out.
+/// Whether an error says that the new database takes no row, rather than that a row is damaged.
+bool EndsRepair(const absl::Status& status) {
+  constexpr std::array<absl::string_view, 4> kReasons = {"DATABASE_FULL", "DATABASE_BUSY",
+                                                         "DATABASE_LOST", "SERVER_OUT_OF_MEMORY"};
+  return absl::c_linear_search(kReasons, ToErrorInfo(status).reason());
+}
+
 absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding) {
   struct Kind {
     const char* table;
@@ -111,7 +106,7 @@ absl::Status CopyWhole(Database& from, Database& to, const OnFinding& on_finding
        {Kind{"meshes", CopyMesh}, Kind{"models", CopyModel}, Kind{"jobs", CopyJob}}) {
     for (const std::string& digest : Names(from, kind.table, on_finding)) {
       absl::Status status = kind.copy(from, to, digest);
-      if (absl::IsResourceExhausted(status)) return status;
+      if (EndsRepair(status)) return status;
       if (status.ok()) continue;
       on_finding(absl::StrCat("left out of ", kind.table, ": ", digest, ": ",
                               std::string(status.message())));
@@ -139,7 +134,14 @@ absl::Status ExtendCutFile(const std::filesystem::path& file) {
   const uint64_t size = std::filesystem::file_size(file, error);
   if (error || size < header.size() || size >= whole) return absl::OkStatus();
   std::filesystem::resize_file(file, whole, error);
-  return error ? CannotCopy(file, error) : absl::OkStatus();
+  return error ? CannotMove(file, error) : absl::OkStatus();
+}
+
+absl::Status CopyToFresh(const std::filesystem::path& file, const std::filesystem::path& fresh,
+                         const OnFinding& on_finding) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<Database> from, Database::Open(file));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Database> to, Database::Open(fresh));
+  return CopyWhole(*from, *to, on_finding);
 }
 
 }  // namespace
@@ -148,42 +150,13 @@ absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path
                                                      const OnFinding& on_finding) {
   RETURN_IF_ERROR(CompleteReplacement(file));
   const std::filesystem::path fresh = file.string() + ".repaired";
-  Remove(fresh);
+  RemoveDatabase(fresh);
   RETURN_IF_ERROR(ExtendCutFile(file));
-  {
-    ASSIGN_OR_RETURN(const std::unique_ptr<Database> from, Database::Open(file));
-    ASSIGN_OR_RETURN(const std::unique_ptr<Database> to, Database::Open(fresh));
-    RETURN_IF_ERROR(CopyWhole(*from, *to, on_finding));
+  if (absl::Status copied = CopyToFresh(file, fresh, on_finding); !copied.ok()) {
+    RemoveDatabase(fresh);
+    return copied;
   }
   return ReplaceDatabase(file, fresh, "damaged");
-}
-
-absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::path& file,
-                                                      const std::filesystem::path& copy) {
-  RETURN_IF_ERROR(CompleteReplacement(file));
-  std::error_code error;
-  const std::filesystem::path incoming = file.string() + ".incoming";
-  Remove(incoming);
-  if (!std::filesystem::exists(copy, error)) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat("there is no file ", copy.string(),
-                                ", or this user may not see it: name a backup"));
-  }
-  std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
-  std::filesystem::copy_file(copy, incoming, error);
-  if (error) return CannotCopy(copy, error);
-  std::string first_finding;
-  absl::Status status = CheckDatabase(incoming, [&](const std::string& line) {
-    if (first_finding.empty()) first_finding = line;
-  });
-  if (status.ok() && !first_finding.empty()) {
-    status = Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                     absl::StrCat(copy.string(), " is damaged (", first_finding,
-                                  "): take an older copy, or repair this one first"));
-  }
-  if (status.ok()) return ReplaceDatabase(file, incoming, "replaced");
-  Remove(incoming);
-  return status;
 }
 
 }  // namespace carillon

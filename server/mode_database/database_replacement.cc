@@ -4,16 +4,19 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <string>
 #include <system_error>
 
+#include "absl/algorithm/container.h"
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/mode_database/database_files.h"
+#include "server/mode_database/sqlite_connection.h"
 
 namespace carillon {
 namespace {
@@ -24,10 +27,21 @@ using std::filesystem::path;
 /// its place. It has two lines: the names of the new database and of the kept one.
 path MarkerOf(const path& file) { return file.string() + "-replacement"; }
 
-absl::Status CannotMove(const path& file, const std::error_code& error) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
-                              "): see that this user may write in its folder"));
+/// Whether a database or a part of it has this name.
+bool IsTaken(const path& name) {
+  return absl::c_any_of(std::array{"", "-wal", "-count"}, [&](const char* suffix) {
+    return std::filesystem::exists(std::filesystem::symlink_status(name.string() + suffix));
+  });
+}
+
+/// Checks that SQLite has copied the log of a closed database into its file, which it cannot on a
+/// full disk, and that the file is whole.
+absl::Status CheckIsWhole(const path& file) {
+  std::error_code error;
+  const uintmax_t left = std::filesystem::file_size(file.string() + "-wal", error);
+  if (!error && left > 0)
+    return CannotMove(file, std::make_error_code(std::errc::no_space_on_device));
+  return SqliteConnection::CheckStructure(file, [] { return true; });
 }
 
 /// Waits until a file or folder is on the disk.
@@ -58,7 +72,7 @@ absl::Status Link(const path& from, const path& to) {
 /// Returns the first name for a kept database that nothing has.
 path NewName(const path& file, const std::string& kind) {
   path name = file.string() + "." + kind;
-  for (int number = 2; std::filesystem::exists(std::filesystem::symlink_status(name)); ++number) {
+  for (int number = 2; IsTaken(name); ++number) {
     name = absl::StrCat(file.string(), ".", kind, "-", number);
   }
   return name;
@@ -66,16 +80,40 @@ path NewName(const path& file, const std::string& kind) {
 
 absl::Status WriteMarker(const path& file, const path& fresh, const path& kept) {
   const path part = MarkerOf(file).string() + ".part";
-  {
-    std::ofstream marker(part);
-    marker << fresh.filename().string() << '\n' << kept.filename().string() << '\n';
-  }
+  std::ofstream marker(part);
+  marker << fresh.filename().string() << '\n' << kept.filename().string() << '\n';
+  marker.close();
+  if (!marker) return CannotMove(part, std::error_code(errno, std::generic_category()));
   RETURN_IF_ERROR(Sync(part));
   RETURN_IF_ERROR(Rename(part, MarkerOf(file)));
   return Sync(file.parent_path());
 }
 
+absl::Status Begin(const path& file, const path& fresh, const path& kept) {
+  RETURN_IF_ERROR(CheckIsWhole(fresh));
+  RETURN_IF_ERROR(Sync(fresh));
+  return WriteMarker(file, fresh, kept);
+}
+
 }  // namespace
+
+absl::Status CannotMove(const path& file, const std::error_code& error) {
+  if (error == std::errc::no_space_on_device || error == std::errc::file_too_large) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "DATABASE_FULL",
+                   absl::StrCat("no space is left for ", file.string(),
+                                ": free some on its disk, and try again"));
+  }
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
+                              "): see that this user may read it, and write in the data folder"));
+}
+
+void RemoveDatabase(const path& file) {
+  std::error_code ignored;
+  for (const char* suffix : {"", "-wal", "-shm", "-count", "-lost"}) {
+    std::filesystem::remove(file.string() + suffix, ignored);
+  }
+}
 
 absl::Status CompleteReplacement(const path& file) {
   std::ifstream marker(MarkerOf(file));
@@ -110,10 +148,17 @@ absl::Status CompleteReplacement(const path& file) {
 
 absl::StatusOr<path> ReplaceDatabase(const path& file, const path& fresh, const std::string& kind) {
   const path absolute = std::filesystem::absolute(file);
-  const bool existed = std::filesystem::exists(absolute);
+  const bool existed = IsTaken(absolute);
   const path kept = NewName(absolute, kind);
-  RETURN_IF_ERROR(Sync(fresh));
-  RETURN_IF_ERROR(WriteMarker(absolute, fresh, kept));
+  if (absl::Status begun = Begin(absolute, fresh, kept); !begun.ok()) {
+    std::error_code ignored;
+    const path marker = MarkerOf(absolute);
+    for (const path& left : {marker, path(marker.string() + ".part")}) {
+      std::filesystem::remove(left, ignored);
+    }
+    RemoveDatabase(fresh);
+    return begun;
+  }
   RETURN_IF_ERROR(CompleteReplacement(absolute));
   return existed ? kept : path();
 }

@@ -31,7 +31,9 @@ sqlite3_file& Real(sqlite3_file* file) {
   return *reinterpret_cast<sqlite3_file*>(reinterpret_cast<WatchedFile*>(file) + 1);
 }
 
-WrittenFile& WrittenOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->written; }
+WrittenFile& WrittenOf(sqlite3_file* file) {
+  return *reinterpret_cast<WatchedFile*>(file)->written;
+}
 
 /// Calls a method of SQLite's own file.
 template <auto kMethod, typename... Arguments>

@@ -21,10 +21,10 @@ from daemon import BIN, Daemon
 import grpc
 
 
-def allow_small_files_only():
-    """As on a full disk: a write beyond 8 KiB fails, and does not end the program."""
+def allow_small_files_only(limit=8192):
+    """As on a full disk: a write beyond `limit` bytes fails, and does not end the program."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
 
 class DatabaseCommandsTest(unittest.TestCase):
@@ -51,10 +51,10 @@ class DatabaseCommandsTest(unittest.TestCase):
     def stats(self):
         return json.loads(self.run_command("--json", "db", "stats"))
 
-    def offline(self, *arguments, folder=None):
-        """carillond db ... on a folder, by default that of the daemon, which is stopped."""
+    def offline(self, *arguments, folder=None, before=None):
+        """carillond db ... on a folder, by default that of the daemon, which is stopped. Calls `before` first."""
         return subprocess.run([BIN / "carillond", "--data-dir", folder or self.folder / "data", "db",
-                               *map(str, arguments)], capture_output=True, text=True, check=False)
+                               *map(str, arguments)], capture_output=True, text=True, check=False, preexec_fn=before)
 
     def flip_a_bit(self, file="data/carillon.db"):
         with sqlite3.connect(self.folder / file) as database:
@@ -244,6 +244,41 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertIn("DATABASE_CORRUPT", self.offline("restore", backup).stderr)
         self.daemon.start()
         self.assertIn("bar", self.run_command("model", "list"))
+
+    def test_a_repair_or_restore_without_space_leaves_all_as_it_is(self):
+        backup = self.folder / "backup.db"
+        self.run_command("db", "backup", backup)
+        self.daemon.stop()
+        data = self.folder / "data"
+        names = sorted(path.name for path in data.iterdir())
+        limit = (data / "carillon.db").stat().st_size // 2
+        for command in (("restore", backup), ("repair",)):
+            failed = self.offline(*command, before=lambda: allow_small_files_only(limit))
+            self.assertEqual((failed.returncode, failed.stdout), (1, ""), command)
+            self.assertRegex(failed.stderr, "DATABASE_(FULL|IO_ERROR|UNUSABLE): ")
+            self.assertEqual(self.offline("check").stdout.splitlines(), ["models: 1, meshes: 0, jobs: 0", "0 faults"])
+            self.assertEqual(sorted(path.name for path in data.iterdir()), names)
+
+    def test_a_database_behind_a_link_is_replaced_where_it_is(self):
+        backup = self.folder / "backup.db"
+        self.run_command("db", "backup", backup)
+        self.run_command("model", "delete", "bar")
+        self.daemon.stop()
+        elsewhere = self.folder / "elsewhere"
+        elsewhere.mkdir()
+        link = self.folder / "data/carillon.db"
+        link.rename(elsewhere / "real.db")
+        link.symlink_to(elsewhere / "real.db")
+        restored = self.offline("restore", backup)
+        self.assertEqual(restored.returncode, 0, restored.stderr)
+        self.assertIn("elsewhere/real.db.replaced", restored.stdout)
+        self.assertTrue(link.is_symlink())
+        self.daemon.start()
+        self.assertIn("bar", self.run_command("model", "list"))
+        self.assertTrue((elsewhere / "real.db-wal").exists())
+        (elsewhere / "real.db-wal").unlink()
+        refused = self.daemon.command("model", "delete", "bar", check=False)
+        self.assertIn("DATABASE_LOST: ", refused.stderr)
 
     def test_over_tcp_only_the_token_makes_an_administrator(self):
         address = next(line.split()[-1] for line in self.daemon.listening if "127.0.0.1" in line)

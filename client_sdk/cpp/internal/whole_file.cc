@@ -23,7 +23,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Suffixes of the files that belong to a database and have its name.
-constexpr const char* kCompanions[] = {"-wal", "-count", "-reserve"};
+constexpr const char* kCompanions[] = {"-wal",     "-shm",  "-count",
+                                       "-reserve", "-lost", "-replacement"};
 
 absl::Status NotWritable(const std::string& path, absl::string_view why) {
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
@@ -39,6 +40,11 @@ absl::Status InUse(const std::string& path, const std::string& companion) {
 /// Refuses to replace a database of a daemon, or a file that belongs to one.
 absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final_path) {
   std::error_code ignored;
+  // Whoever replaces the lock of a data folder lets a second daemon in.
+  if (const fs::path database = fs::path(final_path).replace_filename("carillon.db");
+      fs::path(final_path).filename() == "lock" && fs::exists(database, ignored)) {
+    return InUse(path, database);
+  }
   for (const char* const companion : kCompanions) {
     const std::string beside = final_path + companion;
     if (fs::exists(beside, ignored)) return InUse(path, beside);
@@ -51,19 +57,23 @@ absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final
   return absl::OkStatus();
 }
 
-/// Whether the bytes go to the file at once: it is a device or a pipe, or the name of an open file.
-bool TakesBytesAtOnce(const std::string& path, fs::file_type type) {
-  if (absl::StartsWith(path, "/dev/") || absl::StartsWith(path, "/proc/")) return true;
-  return type != fs::file_type::regular && type != fs::file_type::not_found;
+/// Whether the path is the name of a file that a process has open, such as /dev/fd/1.
+bool IsOpenFile(const fs::path& path) {
+  std::error_code ignored;
+  const std::string folder = fs::canonical(path.parent_path(), ignored).string();
+  return absl::StartsWith(folder, "/proc/") && absl::EndsWith(folder, "/fd");
 }
 
-/// Returns the path with the file to which it leads, without symbolic links. The file need not
-/// exist.
-fs::path WithoutLinks(const std::string& path) {
+/// Returns the path with the file to which it leads, without symbolic links, or an empty path if
+/// the bytes go to that file at once, because it is a device or a pipe, or a process has it open.
+/// The file need not exist.
+fs::path WithoutLinks(const std::string& path, fs::file_type type) {
+  if (type != fs::file_type::regular && type != fs::file_type::not_found) return {};
   std::error_code ignored;
   fs::path found = fs::absolute(path, ignored);
   // The system follows at most 40 links.
   for (int left = 40; left > 0 && fs::is_symlink(found, ignored); --left) {
+    if (IsOpenFile(found)) return {};
     const fs::path target = fs::read_symlink(found, ignored);
     found = found.parent_path() / target;
   }
@@ -82,13 +92,12 @@ void SyncFolder(const std::string& file) {
 }  // namespace
 
 absl::StatusOr<WholeFile> WholeFile::Create(const std::string& path) {
-  const std::string final_path = WithoutLinks(path);
   std::error_code ignored;
   const fs::file_type type = fs::status(path, ignored).type();
   if (type == fs::file_type::directory) return NotWritable(path, "it is a folder; name a file");
-  RETURN_IF_ERROR(CheckIsNoDatabase(path, final_path));
-  WholeFile file(path, TakesBytesAtOnce(path, type) ? "" : final_path);
+  WholeFile file(path, WithoutLinks(path, type));
   if (!file.final_path_.empty()) {
+    RETURN_IF_ERROR(CheckIsNoDatabase(path, file.final_path_));
     RETURN_IF_ERROR(file.OpenBeside());
     return file;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cpp/internal/whole_file.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -78,7 +79,7 @@ TEST_F(WholeFileTest, FollowsLinksToAFileThatMayBeMissing) {
 }
 
 TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
-  for (const char* companion : {"-wal", "-count", "-reserve"}) {
+  for (const char* companion : {"-wal", "-shm", "-count", "-reserve", "-lost", "-replacement"}) {
     const std::string beside = file_.string() + companion;
     Put(file_, "live");
     Put(beside, "live");
@@ -90,6 +91,33 @@ TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
     for (const fs::path& path : {fs::path(beside), folder_ / "link"}) fs::remove(path);
   }
   EXPECT_TRUE(WholeFile::Create(file_).ok());
+}
+
+TEST_F(WholeFileTest, RefusesTheLockOfADataFolder) {
+  EXPECT_TRUE(WholeFile::Create(folder_ / "lock").ok());
+  Put(folder_ / "carillon.db", "live");
+  EXPECT_THAT(Refused(folder_ / "lock"), HasSubstr("OUTPUT_IN_USE: "));
+}
+
+TEST_F(WholeFileTest, LeavesAFileInMemoryAsItIsUnlessItIsPublished) {
+  const fs::path file = fs::path("/dev/shm") / absl::StrCat("whole_file_", getpid());
+  Put(file, "an older copy");
+  { EXPECT_TRUE(WholeFile::Create(file)->Write("a copy").ok()); }
+  EXPECT_EQ(TextOf(file), "an older copy");
+  fs::remove(file);
+}
+
+TEST_F(WholeFileTest, WritesAtOnceIntoAFileThatIsOpen) {
+  Put(file_, "");
+  const int descriptor = open(file_.c_str(), O_WRONLY | O_CLOEXEC);
+  fs::create_symlink(absl::StrCat("/dev/fd/", descriptor), folder_ / "link");
+  for (const fs::path& path : {fs::path(absl::StrCat("/dev/fd/", descriptor)), folder_ / "link"}) {
+    absl::StatusOr<WholeFile> file = WholeFile::Create(path);
+    ASSERT_TRUE(file.ok()) << file.status();
+    ASSERT_TRUE(file->Write("a copy").ok());
+    EXPECT_EQ(TextOf(file_), "a copy");
+  }
+  close(descriptor);
 }
 
 TEST_F(WholeFileTest, SaysWhyItCannotBeWritten) {

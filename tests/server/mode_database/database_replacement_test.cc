@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <functional>
 #include <memory>
@@ -18,15 +19,18 @@
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/mode_database.h"
+#include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
 namespace {
 
 using std::filesystem::path;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 class DatabaseReplacementTest : public ::testing::Test {
  protected:
@@ -46,6 +50,31 @@ class DatabaseReplacementTest : public ::testing::Test {
     const ModelPage page = *database->models().List({}, 0, "");
     for (const ModelSummary& model : page.models) labels.push_back(model.label);
     return labels;
+  }
+
+  /// Makes a database with a model in its log, as it is after a crash.
+  void CopyWithLog(const std::string& name) {
+    const path live = folder_ / "live";
+    std::filesystem::remove_all(live);
+    const auto database = *ModeDatabase::Open(live / "db", clock_);
+    EXPECT_TRUE(database->models()
+                    .PutFile(Sha256Hex("in the log"), "in the log", folder_ / "model")
+                    .status()
+                    .ok());
+    for (const char* suffix : {"", "-wal", "-count"}) {
+      std::filesystem::copy_file(live / (std::string("db") + suffix), folder_ / (name + suffix),
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+  }
+
+  /// The names of all files in the folder.
+  std::vector<std::string> Names() {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
+      names.push_back(entry.path().filename());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
   }
 
   TemporaryFolder folder_;
@@ -68,6 +97,88 @@ TEST_F(DatabaseReplacementTest, EveryDatabaseThatWasReplacedIsKept) {
   EXPECT_EQ(damaged->filename(), "carillon.db.damaged");
   EXPECT_EQ(RepairDatabase(file_, [](const std::string&) {})->filename(), "carillon.db.damaged-2");
   EXPECT_THAT(Labels(file_), ElementsAre("third"));
+}
+
+TEST_F(DatabaseReplacementTest, ADatabaseIsRestoredWithItsLog) {
+  Put(file_, "old");
+  CopyWithLog("copy");
+  const auto kept = RestoreDatabase(file_, folder_ / "copy");
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_THAT(Labels(file_), ElementsAre("in the log"));
+  // The count says that the log is missing.
+  CopyWithLog("copy");
+  std::filesystem::remove(folder_ / "copy-wal");
+  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
+              HasSubstr("DATABASE_CORRUPT: "));
+  EXPECT_THAT(Labels(file_), ElementsAre("in the log"));
+}
+
+TEST_F(DatabaseReplacementTest, AKeptDatabaseNeverGetsTheLogOfAnother) {
+  Put(file_, "old");
+  Put(folder_ / "copy", "new");
+  std::ofstream(folder_ / "carillon.db.replaced-wal") << "of another";
+  const auto kept = RestoreDatabase(file_, folder_ / "copy");
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_EQ(kept->filename(), "carillon.db.replaced-2");
+  EXPECT_THAT(Labels(*kept), ElementsAre("old"));
+}
+
+TEST_F(DatabaseReplacementTest, ALogThatIsLeftAloneIsKeptUnderAPrintedName) {
+  Put(folder_ / "copy", "new");
+  std::ofstream(folder_ / "carillon.db-wal") << "a log";
+  const auto kept = RestoreDatabase(file_, folder_ / "copy");
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_EQ(kept->filename(), "carillon.db.replaced");
+  EXPECT_TRUE(std::filesystem::exists(kept->string() + "-wal"));
+  EXPECT_THAT(Labels(file_), ElementsAre("new"));
+}
+
+TEST_F(DatabaseReplacementTest, ADatabaseWhoseLogCouldNotBeEmptiedReplacesNothing) {
+  Put(file_, "old");
+  CopyWithLog("fresh");
+  EXPECT_THAT(ReplaceDatabase(file_, folder_ / "fresh", "replaced").status().ToString(),
+              HasSubstr("DATABASE_FULL: "));
+  EXPECT_THAT(Labels(file_), ElementsAre("old"));
+  EXPECT_THAT(Names(), Not(Contains(HasSubstr("fresh"))));
+  EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace"))));
+}
+
+TEST_F(DatabaseReplacementTest, AReplacementThatCannotBeNotedDoesNotBegin) {
+  Put(file_, "old");
+  Put(folder_ / "copy", "new");
+  std::filesystem::create_symlink("/dev/full", folder_ / "carillon.db-replacement.part");
+  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
+              HasSubstr("DATABASE_FULL: "));
+  EXPECT_THAT(Labels(file_), ElementsAre("old"));
+  EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace"))));
+}
+
+TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) {
+  Put(file_, "old");
+  const std::vector<std::string> before = Names();
+  const path foreign = folder_ / "foreign";
+  ASSERT_TRUE((*SqliteConnection::Open(foreign))->RunScript("CREATE TABLE models (digest)").ok());
+  std::ofstream(folder_ / "empty");
+  std::ofstream(folder_ / "text") << std::string(5000, 'x');
+  for (const char* name : {"foreign", "empty", "text"}) {
+    EXPECT_THAT(RestoreDatabase(file_, folder_ / name).status().ToString(),
+                HasSubstr(std::string(name) + " is not a database of Carillon: name a file"));
+    std::filesystem::remove(folder_ / name);
+  }
+  EXPECT_THAT(Labels(file_), ElementsAre("old"));
+  EXPECT_EQ(Names(), before);
+}
+
+TEST_F(DatabaseReplacementTest, ADatabaseIsNotRestoredFromItself) {
+  Put(file_, "old");
+  std::filesystem::create_symlink(file_, folder_ / "link");
+  Put(folder_ / "carillon.db.incoming", "new");
+  for (const char* name : {"carillon.db", "link", "carillon.db.incoming"}) {
+    EXPECT_THAT(RestoreDatabase(file_, folder_ / name).status().ToString(),
+                HasSubstr("which the restore would replace: name a backup"));
+  }
+  EXPECT_THAT(Labels(file_), ElementsAre("old"));
+  EXPECT_THAT(Labels(folder_ / "carillon.db.incoming"), ElementsAre("new"));
 }
 
 TEST_F(DatabaseReplacementTest, WhatAKilledProgramHasBegunIsCompletedAtTheNextStart) {
@@ -103,7 +214,7 @@ TEST_F(DatabaseReplacementTest, ARepairKeepsWhatPrecedesTheCutOfAFile) {
   const size_t left = Labels(file_).size();
   EXPECT_GT(left, 10U);
   EXPECT_LT(left, 40U);
-  EXPECT_THAT(findings, testing::Contains(HasSubstr("left out of models: ")));
+  EXPECT_THAT(findings, Contains(HasSubstr("left out of models: ")));
 }
 
 TEST_F(DatabaseReplacementTest, ABackupOfATruncatedDatabaseIsRefused) {
