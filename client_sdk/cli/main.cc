@@ -56,9 +56,37 @@ void AddInfo(CLI::App& app, Program& program) {
       });
 }
 
+void AddCollect(CLI::App& db, Program& program) {
+  auto budget_mib = std::make_shared<uint64_t>(0);
+  CLI::App& collect =
+      *db.add_subcommand("collect", "Delete the models that sounded least recently");
+  auto delete_unpinned = std::make_shared<bool>(false);
+  auto unused_meshes = std::make_shared<bool>(false);
+  auto dry_run = std::make_shared<bool>(false);
+  CLI::Option_group& budget = *collect.add_option_group("budget");
+  budget
+      .add_option("--budget-mib", *budget_mib, "The size that the remaining models may have, MiB")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1} << 40U));
+  budget.add_flag("--delete-unpinned", *delete_unpinned,
+                  "Delete every model that is neither pinned nor sounding");
+  budget.add_flag("--unused-meshes", *unused_meshes,
+                  "Delete only the meshes that no model and no job refers to");
+  budget.require_option(1);
+  collect.add_flag("--dry-run", *dry_run, "Only say what would be deleted");
+  collect.callback([&program, budget_mib, delete_unpinned, unused_meshes, dry_run] {
+    program.command = [&program, budget_mib, delete_unpinned, unused_meshes, dry_run] {
+      v1::CollectGarbageRequest request;
+      request.set_budget_bytes(*budget_mib << 20U);
+      request.set_delete_unpinned(*delete_unpinned);
+      request.set_delete_unused_meshes(*unused_meshes);
+      request.set_dry_run(*dry_run);
+      return CollectGarbage(*program.Daemon(), request, program.json);
+    };
+  });
+}
+
 void AddDatabase(CLI::App& app, Program& program) {
   auto file = std::make_shared<std::string>();
-  auto budget_mib = std::make_shared<uint64_t>(0);
   CLI::App& db =
       *app.add_subcommand("db", "Look after the database of the daemon (for administrators)");
   db.require_subcommand(1);
@@ -73,27 +101,7 @@ void AddDatabase(CLI::App& app, Program& program) {
       return BackUpDatabase(*program.Daemon(), *file, program.json);
     };
   });
-  CLI::App& collect =
-      *db.add_subcommand("collect", "Delete the models that sounded least recently");
-  auto delete_unpinned = std::make_shared<bool>(false);
-  auto dry_run = std::make_shared<bool>(false);
-  CLI::Option_group& budget = *collect.add_option_group("budget");
-  budget
-      .add_option("--budget-mib", *budget_mib, "The size that the remaining models may have, MiB")
-      ->check(CLI::Range(uint64_t{1}, uint64_t{1} << 40U));
-  budget.add_flag("--delete-unpinned", *delete_unpinned,
-                  "Delete every model that is neither pinned nor sounding");
-  budget.require_option(1);
-  collect.add_flag("--dry-run", *dry_run, "Only say what would be deleted");
-  collect.callback([&program, budget_mib, delete_unpinned, dry_run] {
-    program.command = [&program, budget_mib, delete_unpinned, dry_run] {
-      v1::CollectGarbageRequest request;
-      request.set_budget_bytes(*budget_mib << 20U);
-      request.set_delete_unpinned(*delete_unpinned);
-      request.set_dry_run(*dry_run);
-      return CollectGarbage(*program.Daemon(), request, program.json);
-    };
-  });
+  AddCollect(db, program);
 }
 
 void AddTransfer(CLI::App& app, Program& program) {

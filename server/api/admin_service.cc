@@ -145,10 +145,12 @@ grpc::ServerUnaryReactor* AdminService::CollectGarbage(grpc::CallbackServerConte
 
 absl::Status AdminService::Collect(const v1::CollectGarbageRequest& request,
                                    const Principal& caller, v1::CollectGarbageResponse& response) {
-  if ((request.budget_bytes() == 0) != request.delete_unpinned()) {
+  const bool all = request.delete_unpinned();
+  const bool only_meshes = request.delete_unused_meshes();
+  if ((request.budget_bytes() > 0 ? 1 : 0) + (all ? 1 : 0) + (only_meshes ? 1 : 0) != 1) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
-                   "set either budget_bytes above zero, or delete_unpinned to delete every model "
-                   "that is neither pinned nor sounding");
+                   "set budget_bytes above zero, or delete_unpinned to delete every model that is "
+                   "neither pinned nor sounding, or delete_unused_meshes");
   }
   const CallEvents& events = daemon_.writing.events;
   const auto log_deleted = [&](const std::string& digest, uint64_t bytes) {
@@ -158,14 +160,16 @@ absl::Status AdminService::Collect(const v1::CollectGarbageRequest& request,
                    .With("cause", "collection"),
                caller);
   };
-  ASSIGN_OR_RETURN(
-      const Collected models,
-      daemon_.database.models().Collect(request.budget_bytes(),
-                                        {.dry_run = request.dry_run(), .on_deleted = log_deleted}));
+  Collected models;
+  if (!only_meshes) {
+    ASSIGN_OR_RETURN(models, daemon_.database.models().Collect(
+                                 request.budget_bytes(),
+                                 {.dry_run = request.dry_run(), .on_deleted = log_deleted}));
+  }
   response.set_deleted_count(models.model_count);
   response.set_deleted_bytes(models.bytes);
   const std::chrono::milliseconds life =
-      request.delete_unpinned() ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
+      all || only_meshes ? MeshStore::kUnusedLifeOnRequest : MeshStore::kUnusedLife;
   ASSIGN_OR_RETURN(const CollectedMeshes meshes,
                    daemon_.database.meshes().Collect(life, request.dry_run()));
   response.set_deleted_mesh_count(meshes.mesh_count);

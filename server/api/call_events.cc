@@ -16,6 +16,7 @@ CallEvents::CallEvents(const Clock& clock, const EventSink& sink)
     : sink_(sink),
       submitted_(clock, "submitted_jobs", sink),
       cancelled_(clock, "cancelled_jobs", sink),
+      uploaded_(clock, "stored_meshes", sink),
       imported_(clock, "imported_models", sink),
       updated_(clock, "updated_models", sink),
       scenes_(clock, "scenes", sink) {}
@@ -28,6 +29,10 @@ void CallEvents::LogSubmitted(Event event, const Principal& caller) {
 
 void CallEvents::LogCancelled(Event event, const Principal& caller) {
   cancelled_.Log(By(caller, event));
+}
+
+void CallEvents::LogUploaded(Event event, const Principal& caller) {
+  uploaded_.Log(By(caller, event));
 }
 
 void CallEvents::LogImported(Event event, const Principal& caller) {

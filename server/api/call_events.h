@@ -21,6 +21,7 @@ class CallEvents {
 
   void LogSubmitted(Event event, const Principal& caller);
   void LogCancelled(Event event, const Principal& caller);
+  void LogUploaded(Event event, const Principal& caller);
   void LogImported(Event event, const Principal& caller);
   void LogUpdated(Event event, const Principal& caller);
   void LogScene(Event event, const Principal& caller);
@@ -29,6 +30,7 @@ class CallEvents {
   const EventSink sink_;
   LimitedEvents submitted_;
   LimitedEvents cancelled_;
+  LimitedEvents uploaded_;
   LimitedEvents imported_;
   LimitedEvents updated_;
   LimitedEvents scenes_;

@@ -67,9 +67,13 @@ Event Updated(const v1::UpdateModalModelRequest& request) {
 grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::UploadMeshRaw(
     grpc::CallbackServerContext* context, v1::UploadMeshResponse* response) {
   return Open(*context, daemon_.writing, {Role::kSubmit, Holding::kUpload},
-              [&](const Principal&, ClientPlace place) {
-                return MakeUpload(*context, *response, database_.meshes(), daemon_.writing.pool,
-                                  BoundsOf(std::move(place)));
+              [&](const Principal& caller, ClientPlace place) {
+                const auto on_stored = [&events = daemon_.writing.events,
+                                        caller](const Event& event) {
+                  events.LogUploaded(event, caller);
+                };
+                return MakeUpload(*context, *response, {database_.meshes(), on_stored},
+                                  daemon_.writing.pool, BoundsOf(std::move(place)));
               });
 }
 
@@ -78,8 +82,8 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
     v1::CreateModalModelResponse* response) {
   return Answer(
       context, daemon_.writing, Role::kSubmit, [this, request, response](const Principal& caller) {
-        const auto check = [this](const std::string& model, const v1::Material& material) {
-          return MayRemember(model, material);
+        const auto check = [&](const std::string& model, const v1::Material& material) {
+          return MayRemember(model, material, caller);
         };
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check));
         daemon_.writing.events.LogSubmitted(Submitted(response->job()), caller);
@@ -123,7 +127,7 @@ grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
     v1::UpdateModalModelResponse* response) {
   return Answer(context, daemon_.writing, Role::kSubmit,
                 [this, request, response](const Principal& caller) {
-                  RETURN_IF_ERROR(Update(*request, *response));
+                  RETURN_IF_ERROR(Update(*request, caller, *response));
                   daemon_.writing.events.LogUpdated(Updated(*request), caller);
                   return absl::OkStatus();
                 });
@@ -213,18 +217,34 @@ absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
 }
 
 // Another request for a stored model does not take away a material with which its objects sound.
-bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material) {
+bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material,
+                                    const Principal& caller) {
   const auto known = database_.models().Material(digest);
   if (!known.ok() || !known->has_value()) return true;
   // A request that is repeated does not read the model.
   if ((*known)->SerializeAsString() == material.SerializeAsString()) return true;
+  if (!CheckMayChange(digest, caller).ok()) return false;
   if (!absl::IsFailedPrecondition(CheckMaterial(material, digest))) return true;
   return !CheckMaterial(**known, digest).ok();
 }
 
+// A pin protects a model from everybody but administrators: without it a caller could have the
+// model deleted, by imports that exceed the budget.
+absl::Status ModalModelService::CheckMayChange(const std::string& digest, const Principal& caller) {
+  if (caller.has(Role::kAdminister)) return absl::OkStatus();
+  ASSIGN_OR_RETURN(const ModelSummary model, database_.models().Summary(digest));
+  if (!model.pinned) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
+                 absl::StrCat(ModelName(digest), " is pinned, and ", caller.name,
+                              " has not the role administer, which a change of it needs: ask the "
+                              "daemon's administrator to change it"));
+}
+
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
+                                       const Principal& caller,
                                        v1::UpdateModalModelResponse& response) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
+  RETURN_IF_ERROR(CheckMayChange(digest, caller));
   ModelChange change{.add_tags = {request.add_tags().begin(), request.add_tags().end()},
                      .remove_tags = {request.remove_tags().begin(), request.remove_tags().end()}};
   if (request.has_label()) change.label = request.label();

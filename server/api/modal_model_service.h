@@ -65,8 +65,10 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
       grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response);
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
   absl::Status CheckMaterial(const v1::Material& material, const std::string& digest);
-  bool MayRemember(const std::string& digest, const v1::Material& material);
-  absl::Status Update(const v1::UpdateModalModelRequest& request,
+  bool MayRemember(const std::string& digest, const v1::Material& material,
+                   const Principal& caller);
+  absl::Status CheckMayChange(const std::string& digest, const Principal& caller);
+  absl::Status Update(const v1::UpdateModalModelRequest& request, const Principal& caller,
                       v1::UpdateModalModelResponse& response);
   absl::Status List(const v1::ListModalModelsRequest& request,
                     v1::ListModalModelsResponse& response);

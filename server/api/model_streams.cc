@@ -24,7 +24,8 @@ namespace {
 
 class MeshSink {
  public:
-  explicit MeshSink(MeshStore& meshes) : meshes_(&meshes) {}
+  explicit MeshSink(UploadTarget target)
+      : meshes_(&target.meshes), log_event_(std::move(target.log_event)) {}
 
   absl::Status Append(const v1::UploadMeshRequest& request) {
     RETURN_IF_ERROR(Begin());
@@ -36,6 +37,7 @@ class MeshSink {
     ASSIGN_OR_RETURN(const StoredMesh mesh, upload_->Finish());
     response.set_mesh_digest(mesh.digest);
     response.set_byte_count(mesh.byte_count);
+    log_event_(Event("mesh_stored").With("mesh", mesh.digest).With("bytes", mesh.byte_count));
     return absl::OkStatus();
   }
 
@@ -47,6 +49,7 @@ class MeshSink {
   }
 
   MeshStore* meshes_;
+  EventSink log_event_;
   std::optional<MeshUpload> upload_;
 };
 
@@ -165,10 +168,10 @@ class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContext& context,
                                                       v1::UploadMeshResponse& response,
-                                                      MeshStore& meshes, ThreadPool& pool,
+                                                      UploadTarget target, ThreadPool& pool,
                                                       CallBounds bounds) {
   return new ReadCall<v1::UploadMeshRequest, v1::UploadMeshResponse, MeshSink>(
-      context, response, MeshSink(meshes), pool, std::move(bounds));
+      context, response, MeshSink(std::move(target)), pool, std::move(bounds));
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeImport(grpc::CallbackServerContext& context,

@@ -16,9 +16,15 @@ namespace carillon {
 /// The streams of ModalModelService. Each stream deletes itself when its call is done. The database
 /// and the pool must outlive the call.
 
+/// The database that takes a mesh, and the log of the stored meshes.
+struct UploadTarget {
+  MeshStore& meshes;
+  EventSink log_event;
+};
+
 grpc::ServerReadReactor<grpc::ByteBuffer>* MakeUpload(grpc::CallbackServerContext& context,
                                                       v1::UploadMeshResponse& response,
-                                                      MeshStore& meshes, ThreadPool& pool,
+                                                      UploadTarget target, ThreadPool& pool,
                                                       CallBounds bounds);
 
 /// The database that takes an import, whether the import may replace a model of other content, and

@@ -33,8 +33,7 @@ struct ActiveJob {
   v1::CreateModalModelRequest request;  ///< the request so far that reaches farthest
   std::optional<v1::CreateModalModelRequest> running{};  ///< the request that its run was given
   v1::Progress progress{};                               ///< of the run
-  /// The client in whose queue the job is. It is empty if the job was asked for before the daemon
-  /// started.
+  /// The client in whose queue the job is. It is empty if no client is known to want the job.
   std::string client{};
   JobWishes wishes{};           ///< the clients that want the job
   std::string waits_for{};      ///< digest of the coarse model's job, until that job has ended

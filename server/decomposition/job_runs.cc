@@ -100,10 +100,14 @@ void JobRuns::FollowByTransfer(const ActiveJob& model) {
       job.again = job.running.has_value();
       job.wishes.Add(model.wishes);
     });
+    // A wish that cannot be stored ends with the daemon.
+    for (const std::string& client : model.wishes.Wanting()) {
+      database_.jobs().AddClient(wanted.digest, client).IgnoreError();
+    }
     return;
   }
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
-  const absl::Status stored = database_.jobs().Put(record);
+  const absl::Status stored = database_.jobs().Put(record, model.wishes.Wanting());
   if (!stored.ok()) return settings_.log(std::string(stored.message()));
   JobOrigin origin{.client = model.client};
   origin.wishes.Add(model.wishes);
@@ -186,7 +190,7 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
     StartWhatFits(notices);
     for (Notice& news : jobs_.NewsOfWaiting()) notices.push_back(std::move(news));
   }
-  for (const Notice& notice : notices) notice.Tell();
+  TellAll(notices);
 }
 
 // Puts the model or the transfer into the database, without the writer's lock. An error in storing

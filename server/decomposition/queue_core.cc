@@ -28,10 +28,6 @@ JobFilter AsStored(JobFilter filter) {
   return filter;
 }
 
-void TellAll(const std::vector<Notice>& notices) {
-  for (const Notice& notice : notices) notice.Tell();
-}
-
 }  // namespace
 
 absl::Status QueueCore::TakeUp() {
@@ -56,14 +52,18 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
     return database_.jobs().Put(record);
   }
   auto request = ParseRequest(record);
+  JobWishes wishes = StoredWishes(record.digest);
   const WantedJob wanted{.digest = record.digest,
                          .request = request.value_or(v1::CreateModalModelRequest()),
-                         .transfer_of = record.transfer_of};
+                         .transfer_of = record.transfer_of,
+                         .client = wishes.OtherThan("")};
   const absl::StatusOr<bool> satisfied =
       request.ok() ? IsSatisfied(database_, wanted, std::nullopt) : request.status();
   if (satisfied.ok() && !*satisfied && record.start_count < kMostStarts) {
     std::string coarse = StartCoarse(wanted, notices);
-    runs_.Enqueue(std::move(record), *std::move(request), {.waits_for = std::move(coarse)});
+    runs_.Enqueue(
+        std::move(record), *std::move(request),
+        {.client = wanted.client, .wishes = std::move(wishes), .waits_for = std::move(coarse)});
     return absl::OkStatus();
   }
   const uint32_t start_count = std::exchange(record.start_count, 0);
@@ -75,6 +75,21 @@ absl::Status QueueCore::TakeUpJob(JobRecord record, Notices& notices) {
     runs_.events().LogFailure(record, "");
   }
   return database_.jobs().Put(record);
+}
+
+/// Wishes that cannot be read leave a job that only callers with the role administer may cancel.
+JobWishes QueueCore::StoredWishes(const std::string& digest) {
+  return JobWishes(database_.jobs().Clients(digest).value_or(std::vector<std::string>()));
+}
+
+absl::Status QueueCore::AddWish(const std::string& digest, const std::string& client) {
+  const std::optional<ActiveJob> active = jobs_.Find(digest);
+  if (!active.has_value() || client.empty() || active->wishes.IsWantedBy(client)) {
+    return absl::OkStatus();
+  }
+  RETURN_IF_ERROR(database_.jobs().AddClient(digest, client));
+  jobs_.AddWish(digest, client);
+  return absl::OkStatus();
 }
 
 void QueueCore::Stop() {
@@ -156,14 +171,14 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
   if (satisfied) record.state = v1::JOB_STATE_SUCCEEDED;
   if (known.has_value()) record.peak_bytes = known->peak_bytes;
-  RETURN_IF_ERROR(database_.jobs().Put(record));
+  RETURN_IF_ERROR(database_.jobs().Put(record, JobWishes({client}).Wanting()));
   if (satisfied) {
     const v1::Job ended = ToJob(record);
     jobs_.TellEnded(ended);
     return ended;
   }
-  runs_.Enqueue(std::move(record), request, {.client = client, .waits_for = std::move(coarse)});
-  jobs_.AddWish(digest, client);
+  runs_.Enqueue(std::move(record), request,
+                {.client = client, .wishes = StoredWishes(digest), .waits_for = std::move(coarse)});
   runs_.StartWhatFits(notices);
   return Get(digest);
 }
@@ -190,7 +205,7 @@ std::string QueueCore::StartCoarse(const WantedJob& fine, Notices& notices) {
   if (!coarse.has_value()) return "";
   std::string coarse_digest = RequestDigest(*coarse);
   if (jobs_.Contains(coarse_digest)) {
-    jobs_.AddWish(coarse_digest, fine.client);
+    AddWish(coarse_digest, fine.client).IgnoreError();
   } else {
     WantedJob wanted = WantedModel(*coarse);
     wanted.client = fine.client;
@@ -209,14 +224,14 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active, const Wa
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
   const bool farther = WantsMore(request, active.request);
   const bool sooner = request.priority() > active.record.priority;
-  jobs_.AddWish(active.waits_for, wanted.client);
-  if (!wanted_no_more) jobs_.AddWish(digest, wanted.client);
+  RETURN_IF_ERROR(AddWish(active.waits_for, wanted.client));
+  if (!wanted_no_more) RETURN_IF_ERROR(AddWish(digest, wanted.client));
   if (!wanted_no_more && !farther && !sooner) return Get(digest);
   JobRecord record = active.record;
   record.state = v1::JOB_STATE_QUEUED;
   record.priority = std::max(record.priority, request.priority());
   if (wanted_no_more || farther) record.request = request.SerializeAsString();
-  RETURN_IF_ERROR(database_.jobs().Put(record));
+  RETURN_IF_ERROR(database_.jobs().Put(record, JobWishes({wanted.client}).Wanting()));
   return jobs_
       .Change(digest,
               [&](ActiveJob& job) {
@@ -287,84 +302,6 @@ absl::StatusOr<DecompositionJobPage> QueueCore::List(int page_size, const std::s
     ASSIGN_OR_RETURN(records,
                      database_.jobs().List(page_size, page.next_page_token, AsStored(filter)));
   }
-}
-
-// Returns whether other clients still want the job. The job then counts for one of them.
-bool QueueCore::Withdraw(const ActiveJob& active, const std::string& client) {
-  const std::string other = active.wishes.OtherThan(client);
-  if (other.empty()) return false;
-  jobs_.Change(active.record.digest, [&](ActiveJob& job) {
-    job.wishes.Withdraw(client);
-    if (job.client == client) job.client = other;
-  });
-  return true;
-}
-
-absl::StatusOr<v1::Job> QueueCore::Cancel(const std::string& digest,
-                                          const std::optional<std::string>& client) {
-  Notices notices;
-  JobRecord record;
-  {
-    MutexLock lock(&runs_.writer());
-    const std::optional<ActiveJob> active = jobs_.Find(digest);
-    if (!active.has_value()) return FindStored(digest);
-    if (client.has_value()) {
-      RETURN_IF_ERROR(active->wishes.CheckCancel(digest, *client));
-      if (Withdraw(*active, *client)) return Get(digest);
-    }
-    // The worker ends first, because the database may take a while.
-    if (active->running.has_value()) runs_.Cancel(digest);
-    record = active->record;
-    record.state = v1::JOB_STATE_CANCELLED;
-    RETURN_IF_ERROR(database_.jobs().Put(record));
-    if (active->running.has_value()) {
-      return jobs_
-          .Change(digest,
-                  [&](ActiveJob& job) {
-                    job.record = record;
-                    job.again = false;
-                    job.wishes.Clear();
-                  })
-          .job;
-    }
-    EndQueued(record, notices);
-  }
-  TellAll(notices);
-  return ToJob(record);
-}
-
-absl::Status QueueCore::DeleteModel(const std::string& digest) {
-  Notices notices;
-  {
-    MutexLock lock(&runs_.writer());
-    RETURN_IF_ERROR(database_.models().Delete(digest));
-    for (const std::string& transfer : jobs_.TransfersOf(digest)) Drop(transfer, notices);
-    Drop(digest, notices);
-  }
-  TellAll(notices);
-  return absl::OkStatus();
-}
-
-// Ends a job that waits or runs and whose row is no longer in the database.
-void QueueCore::Drop(const std::string& digest, Notices& notices) {
-  std::optional<ActiveJob> active = jobs_.Find(digest);
-  if (!active.has_value()) return;
-  active->record.state = v1::JOB_STATE_CANCELLED;
-  if (!active->running.has_value()) return EndQueued(active->record, notices);
-  runs_.Cancel(digest);
-  jobs_.Change(digest, [&](ActiveJob& job) {
-    job.record.state = v1::JOB_STATE_CANCELLED;
-    job.deleted = true;
-    job.again = false;
-    job.wishes.Clear();
-  });
-}
-
-void QueueCore::EndQueued(const JobRecord& record, Notices& notices) {
-  notices.push_back(jobs_.Remove(record.digest, ToJob(record)));
-  runs_.ReleaseWaiting(record.digest, notices);
-  runs_.StartWhatFits(notices);
-  for (Notice& news : jobs_.NewsOfWaiting()) notices.push_back(std::move(news));
 }
 
 absl::Status QueueCore::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {

@@ -82,7 +82,11 @@ class QueueCore {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   std::string StartCoarse(const WantedJob& fine, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
-  bool Withdraw(const ActiveJob& active, const std::string& client)
+  JobWishes StoredWishes(const std::string& digest);
+  /// Notes that a client wants a job that waits or runs.
+  absl::Status AddWish(const std::string& digest, const std::string& client)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<bool> Withdraw(const ActiveJob& active, const std::string& client)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
   void OnQuarantine(const std::string& digest, const absl::Status& why);
   bool ComputeAgain(const std::string& digest, Notices& notices)

@@ -53,4 +53,8 @@ struct Notice {
   }
 };
 
+inline void TellAll(const std::vector<Notice>& notices) {
+  for (const Notice& notice : notices) notice.Tell();
+}
+
 }  // namespace carillon

@@ -87,7 +87,8 @@ absl::Status CopyJob(Database& from, Database& to, const std::string& digest) {
   ASSIGN_OR_RETURN(const auto job, JobStore(from).Find(digest));
   if (!job.has_value()) return absl::OkStatus();
   if (job->damaged) return FromErrorInfo(absl::StatusCode::kDataLoss, job->error);
-  return JobStore(to).Put(*job);
+  ASSIGN_OR_RETURN(const auto clients, JobStore(from).Clients(digest));
+  return JobStore(to).Put(*job, clients);
 }
 
 /// Whether an error says that the new database takes no row, rather than that a row is damaged.

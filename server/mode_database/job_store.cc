@@ -77,26 +77,66 @@ std::string StatesAre(const std::vector<v1::JobState>& states) {
                       ") ");
 }
 
+constexpr char kAddClient[] =
+    "INSERT OR IGNORE INTO job_clients (digest, client) SELECT digest, ? FROM jobs WHERE digest = "
+    "?";
+constexpr char kForgetClients[] = "DELETE FROM job_clients WHERE digest = ?";
+
+absl::Status PutRow(SqliteConnection& connection, const JobRecord& job) {
+  const std::string error = job.error.SerializeAsString();
+  return connection.Run(
+      "INSERT INTO jobs (digest, label, state, remembered, created_unix_ms, priority, "
+      "start_count, way, peak_bytes, xxh3, error, request, transfer_of) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET "
+      "label = excluded.label, state = excluded.state, remembered = excluded.remembered, "
+      "created_unix_ms = excluded.created_unix_ms, priority = excluded.priority, "
+      "start_count = excluded.start_count, way = excluded.way, "
+      "peak_bytes = excluded.peak_bytes, xxh3 = excluded.xxh3, error = excluded.error, "
+      "request = excluded.request, transfer_of = excluded.transfer_of",
+      {job.digest, job.label, static_cast<int64_t>(job.state),
+       static_cast<int64_t>(job.remembered ? 1 : 0), job.created_unix_ms,
+       static_cast<int64_t>(job.priority), static_cast<int64_t>(job.start_count),
+       static_cast<int64_t>(job.way), static_cast<int64_t>(job.peak_bytes), RowHash(job, error),
+       SqlBlob{error}, SqlBlob{job.request}, job.transfer_of});
+}
+
 }  // namespace
 
-absl::Status JobStore::Put(const JobRecord& job) {
-  const std::string error = job.error.SerializeAsString();
+absl::Status JobStore::Put(const JobRecord& job, const std::vector<std::string>& clients) {
+  const bool has_ended = job.state != v1::JOB_STATE_QUEUED && job.state != v1::JOB_STATE_RUNNING;
   return database_->Write([&](SqliteConnection& connection) {
-    return connection.Run(
-        "INSERT INTO jobs (digest, label, state, remembered, created_unix_ms, priority, "
-        "start_count, way, peak_bytes, xxh3, error, request, transfer_of) "
-        "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (digest) DO UPDATE SET "
-        "label = excluded.label, state = excluded.state, remembered = excluded.remembered, "
-        "created_unix_ms = excluded.created_unix_ms, priority = excluded.priority, "
-        "start_count = excluded.start_count, way = excluded.way, "
-        "peak_bytes = excluded.peak_bytes, xxh3 = excluded.xxh3, error = excluded.error, "
-        "request = excluded.request, transfer_of = excluded.transfer_of",
-        {job.digest, job.label, static_cast<int64_t>(job.state),
-         static_cast<int64_t>(job.remembered ? 1 : 0), job.created_unix_ms,
-         static_cast<int64_t>(job.priority), static_cast<int64_t>(job.start_count),
-         static_cast<int64_t>(job.way), static_cast<int64_t>(job.peak_bytes), RowHash(job, error),
-         SqlBlob{error}, SqlBlob{job.request}, job.transfer_of});
+    RETURN_IF_ERROR(PutRow(connection, job));
+    if (has_ended) return connection.Run(kForgetClients, {job.digest});
+    for (const std::string& client : clients) {
+      RETURN_IF_ERROR(connection.Run(kAddClient, {client, job.digest}));
+    }
+    return absl::OkStatus();
   });
+}
+
+absl::Status JobStore::AddClient(const std::string& digest, const std::string& client) {
+  return database_->Write([&](SqliteConnection& connection) {
+    return connection.Run(kAddClient, {client, digest});
+  });
+}
+
+absl::Status JobStore::RemoveClient(const std::string& digest, const std::string& client) {
+  return database_->WriteToFree([&](SqliteConnection& connection) {
+    return connection.Run("DELETE FROM job_clients WHERE digest = ? AND client = ?",
+                          {digest, client});
+  });
+}
+
+absl::StatusOr<std::vector<std::string>> JobStore::Clients(const std::string& digest) {
+  std::vector<std::string> clients;
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
+    return connection.Query("SELECT client FROM job_clients WHERE digest = ?", {digest},
+                            [&](const SqlRow& row) {
+                              clients.push_back(row.Text(0));
+                              return absl::OkStatus();
+                            });
+  }));
+  return clients;
 }
 
 absl::StatusOr<std::optional<JobRecord>> JobStore::Find(const std::string& digest) {

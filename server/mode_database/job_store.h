@@ -52,8 +52,18 @@ class JobStore {
  public:
   explicit JobStore(Database& database) : database_(&database) {}
 
-  /// Writes a job durably, and replaces a job with the same digest.
-  absl::Status Put(const JobRecord& job);
+  /// Writes a job durably, and replaces a job with the same digest. Adds `clients` to those that
+  /// want it. All clients of a job that has ended are forgotten.
+  absl::Status Put(const JobRecord& job, const std::vector<std::string>& clients = {});
+
+  /// Notes durably that a client wants a job. It is no error if there is no such job.
+  absl::Status AddClient(const std::string& digest, const std::string& client);
+
+  /// Notes durably that a client does not want a job any more.
+  absl::Status RemoveClient(const std::string& digest, const std::string& client);
+
+  /// Returns the clients that want a job.
+  absl::StatusOr<std::vector<std::string>> Clients(const std::string& digest);
 
   absl::StatusOr<std::optional<JobRecord>> Find(const std::string& digest);
 

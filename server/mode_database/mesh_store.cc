@@ -143,7 +143,7 @@ absl::StatusOr<StoredMesh> MeshUpload::Finish() {
   };
   absl::Status status = insert();
   if (absl::IsResourceExhausted(status)) {
-    const auto collected = meshes_->Collect(MeshStore::kUnusedLifeOnFullDisk);
+    const auto collected = meshes_->Collect(MeshStore::kUnusedLifeOnRequest);
     if (collected.ok() && collected->mesh_count > 0) status = insert();
   }
   if (!status.ok()) return status;

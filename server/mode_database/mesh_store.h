@@ -33,7 +33,7 @@ class MeshUpload {
   absl::Status Append(std::string_view bytes);
 
   /// Stores the mesh durably, unless it is stored already. If the disk is full, meshes that nobody
-  /// uses make room (MeshStore::kUnusedLifeOnFullDisk). Must be the last call. Errors:
+  /// uses make room (MeshStore::kUnusedLifeOnRequest). Must be the last call. Errors:
   /// InvalidArgument (MESH_EMPTY), ResourceExhausted (DATABASE_FULL).
   absl::StatusOr<StoredMesh> Finish();
 
@@ -61,9 +61,8 @@ class MeshStore {
   /// The time for which a mesh that no model and no job refers to is kept after its last upload. A
   /// request for its model may follow.
   static constexpr std::chrono::hours kUnusedLife{24};
-  /// The shorter time for which such a mesh is kept when the disk is full.
-  static constexpr std::chrono::minutes kUnusedLifeOnFullDisk{10};
-  /// The still shorter time for which such a mesh is kept when somebody asks for the space.
+  /// The shorter time for which such a mesh is kept when the disk is full or somebody asks for the
+  /// space.
   static constexpr std::chrono::minutes kUnusedLifeOnRequest{1};
 
   MeshStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}

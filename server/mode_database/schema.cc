@@ -101,6 +101,13 @@ constexpr std::array kMigrations = {R"sql(
     xxh3 INTEGER NOT NULL,
     material BLOB NOT NULL
   ) STRICT, WITHOUT ROWID;
+)sql",
+                                    R"sql(
+  CREATE TABLE job_clients (
+    digest TEXT NOT NULL REFERENCES jobs (digest) ON DELETE CASCADE,
+    client TEXT NOT NULL,
+    PRIMARY KEY (digest, client)
+  ) STRICT, WITHOUT ROWID;
 )sql"};
 
 absl::StatusOr<int64_t> Version(SqliteConnection& connection) {

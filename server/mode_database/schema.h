@@ -6,6 +6,8 @@
 
 // The tables, with their keys left of the bar:
 //
+//   job_clients     digest + client
+//                     v
 //   jobs          number | digest  label  state  priority  way  error  xxh3  request ...
 //                            :                                                  :
 //   model_tags       tag + digest                                               : mesh_digest

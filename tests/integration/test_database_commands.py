@@ -215,8 +215,8 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertIn("has changed on the disk", checked.stdout)
         repaired = self.offline("repair")
         self.assertEqual(repaired.returncode, 1)
-        self.assertRegex(repaired.stdout, r"left out of models: \w+: .*\n.*models: 1, meshes: 0, jobs: 0\n"
-                                          r".*carillon.db.damaged\n1 fault\n")
+        self.assertRegex(repaired.stdout, r"left out of models: \w+: .*\n.*carillon.db.damaged\n"
+                                          r"models: 1, meshes: 0, jobs: 0\n1 fault\n")
         self.assertIn("0 faults", self.offline("check").stdout)
         self.assertTrue((self.folder / "data/carillon.db.damaged").exists())
         self.daemon.start()

@@ -45,6 +45,11 @@ class RequestTest(DaemonTest):
         self.assert_refused(lambda: self.admin.CollectGarbage(request(dry_run=True)), "INVALID_BUDGET")
         self.assert_refused(lambda: self.admin.CollectGarbage(request(budget_bytes=1, delete_unpinned=True)),
                             "INVALID_BUDGET")
+        self.assert_refused(lambda: self.admin.CollectGarbage(request(budget_bytes=1, delete_unused_meshes=True)),
+                            "INVALID_BUDGET")
+        self.assertEqual(self.admin.CollectGarbage(request(delete_unused_meshes=True)).deleted_count, 0)
+        self.daemon.command("db", "collect", "--unused-meshes")
+        self.assertEqual([found.name for found in self.client.list()], models)
         counted = self.admin.CollectGarbage(request(budget_bytes=1, dry_run=True))
         self.assertEqual(counted.deleted_count, len(models))
         self.assertEqual([found.name for found in self.client.list()], models)

@@ -13,7 +13,7 @@ import meshes
 import scripted
 import strike
 import torture
-from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_service_pb2
 from daemon import Daemon
 
 ROLES = {"alice": "submit", "bob": "submit", "mallory": "submit", "boss": "submit,administer"}
@@ -81,14 +81,43 @@ class SharedJobsTest(unittest.TestCase):
         self.assertEqual(self.daemon.command("job", "cancel", job.split("/")[1]).returncode, 0)
         torture.wait_until(lambda: not self.goes_on(job), 30)
 
-    def test_a_job_from_before_the_start_belongs_to_nobody(self):
-        job = self.submit("alice")
+    def test_a_pinned_model_is_changed_by_administrators_only(self):
+        model = scripted.make_model(self.folder)
+        name = self.daemon.command("model", "import", model, "--label", "bell").stdout.strip()
+        update = modal_model_service_pb2.UpdateModalModelRequest
+        alice = self.clients["alice"].models
+        alice.UpdateModalModel(update(name=name, label="chime"))
+        self.clients["boss"].models.UpdateModalModel(update(name=name, pinned=True))
+        for change in ({"pinned": False}, {"label": "mine"}, {"add_tags": ["mine"]},
+                       {"material": material_pb2.Material(preset="glass")}):
+            with self.assertRaises(grpc.RpcError) as refused:
+                alice.UpdateModalModel(update(name=name, **change))
+            self.assertEqual(strike.refusal(refused.exception).info.reason, "ROLE_MISSING", change)
+        boss = self.clients["boss"].models
+        self.assertEqual(boss.UpdateModalModel(update(name=name, pinned=False)).modal_model.label, "chime")
+        alice.UpdateModalModel(update(name=name, label="mine"))
+
+    def restart(self):
         self.daemon.kill()
         self.daemon.start()
         self.address = self.daemon.listening[-1].split()[-1]
         self.clients = {name: self.client(name) for name in ROLES}
-        self.assertTrue(self.goes_on(job))
+
+    def test_a_restart_gives_no_job_to_others(self):
+        job = self.submit("alice")
+        self.submit("bob")
+        self.submit("mallory")
         self.assertEqual(self.cancel(self.clients["bob"], job), "")
+        self.restart()
+        self.assertTrue(self.goes_on(job))
+        self.assertEqual(self.cancel(self.clients["bob"], job), "JOB_OF_ANOTHER")
+        self.assertEqual(self.cancel(self.clients["mallory"], job), "")
+        self.restart()
+        self.assertEqual(self.cancel(self.clients["mallory"], job), "JOB_OF_ANOTHER")
+        self.submit("mallory")
+        self.assertEqual(self.cancel(self.clients["mallory"], job), "")
+        self.assertTrue(self.goes_on(job))
+        self.assertEqual(self.cancel(self.clients["alice"], job), "")
         torture.wait_until(lambda: not self.goes_on(job), 30)
 
 

@@ -42,18 +42,23 @@ class EventApi : public ServedDaemon {
                                [&](const std::string& line) { return line.rfind(name, 0) == 0; });
   }
 
-  /// Requests a job that fails.
-  v1::Job Submit(const std::string& label) {
+  /// Stores a mesh file, and returns its digest.
+  std::string Upload(const std::string& bytes) {
     grpc::ClientContext context;
     v1::UploadMeshResponse uploaded;
     const auto writer = models->UploadMesh(&context, &uploaded);
     v1::UploadMeshRequest mesh;
-    mesh.set_data("the mesh of " + label);
+    mesh.set_data(bytes);
     writer->Write(mesh);
     writer->WritesDone();
     EXPECT_TRUE(writer->Finish().ok());
+    return uploaded.mesh_digest();
+  }
+
+  /// Requests a job that fails.
+  v1::Job Submit(const std::string& label) {
     v1::CreateModalModelRequest request;
-    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_digest(Upload("the mesh of " + label));
     request.set_mesh_format("obj");
     request.mutable_material()->set_preset("chime_aluminum");
     request.set_label(label);
@@ -74,6 +79,11 @@ class EventApi : public ServedDaemon {
   const std::string by_ = absl::StrCat(" caller=local peer=unix:pid-", getpid());
   std::unique_ptr<v1::AdminService::Stub> admin;
 };
+
+TEST_F(EventApi, AnUploadNamesTheMeshAndTheCaller) {
+  const std::string mesh = Upload("solid");
+  EXPECT_THAT(events(), ElementsAre(absl::StrCat("mesh_stored mesh=", mesh, " bytes=5", by_)));
+}
 
 TEST_F(EventApi, AnImportAndADeletionNameTheModelAndTheCaller) {
   const std::string model = ImportSmallModel();

@@ -3,6 +3,7 @@
 // Who ends a job that several clients have asked for.
 #include "absl/strings/str_cat.h"
 #include "server/decomposition/wanted_job.h"
+#include "server/mode_database/database_admin.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
@@ -29,6 +30,14 @@ class JobCancelTest : public DecompositionQueueTest {
     const auto cancelled = queue_->Cancel(DigestOf(job), client);
     EXPECT_TRUE(cancelled.ok()) << cancelled.status();
     return cancelled.ok() ? cancelled->state() : v1::JOB_STATE_UNSPECIFIED;
+  }
+
+  /// Cancels a job that no other client wants, and waits until it has ended.
+  void CancelToTheEnd(const std::string& client, const v1::Job& job) {
+    Diary end;
+    const auto watch = Watch(job, end);
+    CancelFor(client, job);
+    EXPECT_EQ(end.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
   }
 
   const Gate gate_{folder_ / "gate"};
@@ -90,11 +99,32 @@ TEST_F(JobCancelTest, WhoCancelledARunningJobCannotCancelItForTheNextClient) {
   EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "mallory").status()));
 }
 
-TEST_F(JobCancelTest, AJobOfAnEarlierDaemonMayBeCancelledByEachClient) {
+TEST_F(JobCancelTest, AJobOfAnEarlierDaemonIsCancelledByThoseThatWantedItThere) {
   MakeBusyQueue();
   const v1::Job job = SubmitFor("alice", 2);
+  SubmitFor("bob", 2);
+  SubmitFor("mallory", 2);
+  CancelFor("mallory", job);
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  EXPECT_EQ(CancelFor("bob", job), v1::JOB_STATE_CANCELLED);
+  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "mallory").status()));
+  EXPECT_NE(CancelFor("bob", job), v1::JOB_STATE_CANCELLED);
+  CancelToTheEnd("alice", job);
+  // A job that is asked for again belongs to nobody who wanted the ended one.
+  SubmitFor("mallory", 2);
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "alice").status()));
+}
+
+TEST_F(JobCancelTest, ARepairedDatabaseKnowsWhoWantsItsJobs) {
+  MakeBusyQueue();
+  const v1::Job job = SubmitFor("alice", 2);
+  queue_.reset();
+  database_.reset();
+  ASSERT_TRUE(RepairDatabase(folder_ / "carillon.db", [](const std::string&) {}).ok());
+  Open("carillon.db");
+  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
+  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "bob").status()));
+  CancelToTheEnd("alice", job);
 }
 
 TEST_F(JobCancelTest, AJobThatAClientHasCancelledCountsForAnother) {
