@@ -114,6 +114,16 @@ TEST_F(OptionsFile, AValueOfAnotherTypeIsRefusedWithTheTypeThatIsWanted) {
   ExpectRefused("job_time = 2026-11-27\n", " line 1: job_time has a value of the wrong type");
 }
 
+TEST_F(OptionsFile, MetricsHaveOneAddress) {
+  for (const char* address : {"a:1,b:2", "127.0.0.1:1,2", "127.0.0.1: 1", "127.0.0.1 :1", "[::1]:1",
+                              "::1:1", ":1", "127.0.0.1:1s"}) {
+    ExpectRefused(std::string("metrics = \"") + address + "\"\n",
+                  "; it must be one HOST:PORT with an IPv4 address or a name");
+  }
+  ExpectRefused("listen = \"127.0.0.1:1\"\nmetrics = \"127.0.0.1:1\"\n",
+                "--listen and --metrics both name 127.0.0.1:1");
+}
+
 TEST(Options, AFlagOutOfRangeIsNamedAsItIsWritten) {
   EXPECT_THAT(Read({"--sample-rate", "1"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: --sample-rate is 1; it must be 8000 to 192000"));
