@@ -10,6 +10,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/metrics/metrics_address.h"
 
 namespace carillon {
 namespace {
@@ -64,8 +66,9 @@ class ExposedMetrics final : public MetricsServer {
 
 absl::StatusOr<std::unique_ptr<MetricsServer>> MetricsServer::Start(const std::string& address,
                                                                     Read read) {
+  ASSIGN_OR_RETURN(const std::string numeric, FindMetricsAddress(address));
   try {
-    return std::make_unique<ExposedMetrics>(address, std::move(read));
+    return std::make_unique<ExposedMetrics>(numeric, std::move(read));
   } catch (const std::exception& error) {
     return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
                    absl::StrCat("cannot serve metrics on ", address, ": ", error.what(),
