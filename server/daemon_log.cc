@@ -8,6 +8,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -80,6 +81,10 @@ void SetUpLog() {
 }
 
 void SetLogLevel(const std::string& name) { spdlog::set_level(spdlog::level::from_str(name)); }
+
+void LowerLogLevel(const std::string& name) {
+  spdlog::set_level(std::min(spdlog::get_level(), spdlog::level::from_str(name)));
+}
 
 void LogEvent(const Event& event) {
   const spdlog::level::level_enum level = LevelOf(event.level());

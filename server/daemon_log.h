@@ -14,6 +14,9 @@ void SetUpLog();
 /// Sets the lowest level that is logged, by its name in Options::log_level.
 void SetLogLevel(const std::string& name);
 
+/// Sets the lowest level that is logged to `name`, unless the present one is lower still.
+void LowerLogLevel(const std::string& name);
+
 void LogEvent(const Event& event);
 
 }  // namespace carillon

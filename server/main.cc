@@ -152,14 +152,16 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
     status = server.Reload(ApiSettingsOf(changed));
   }
   if (status.ok()) {
+    // The outcome is logged if the old level or the new one lets it through.
+    LowerLogLevel(changed.log_level);
     if (!(changed == read->options)) {
       spdlog::warn(
           "some changed settings need a restart: a reload takes only the log level, the access "
           "file and the TLS files into account, and does not begin or end the use of a file");
     }
     options = changed;
-    SetLogLevel(options.log_level);
     spdlog::info("the configuration, the access file and the TLS files were read again");
+    SetLogLevel(options.log_level);
   } else {
     spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));
   }

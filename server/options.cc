@@ -102,15 +102,24 @@ void VisitSettings(SomeOptions& options, const Visit& visit) {
   visit("slurm_tls_roots", options.slurm_tls_roots);
 }
 
+/// Returns how a value of type T is written in the configuration file.
+template <typename T>
+constexpr absl::string_view WayToWrite() {
+  if constexpr (std::is_same_v<T, bool>) return "true or false";
+  if constexpr (std::is_same_v<T, std::string>) return "a text in quotation marks";
+  return std::is_integral_v<T> ? "a whole number within its range" : "a number";
+}
+
 /// Stores one value of the configuration file in `target`.
 template <typename T>
 absl::Status ReadValue(absl::string_view key, const toml::node& node, T& target) {
-  // toml++ would read the integer 1 as true.
-  if (const auto v = node.value<T>(); v && (node.is_boolean() || !std::is_same_v<T, bool>)) {
+  // toml++ would read the integer 1 as true, and true as the number 1.
+  if (const auto v = node.value<T>(); v && node.is_boolean() == std::is_same_v<T, bool>) {
     target = *v;
     return absl::OkStatus();
   }
-  return InvalidConfiguration(absl::StrCat(key, " has a value of the wrong type or size"));
+  return InvalidConfiguration(
+      absl::StrCat(key, " has a value of the wrong type or size; write ", WayToWrite<T>()));
 }
 
 absl::Status ReadValue(absl::string_view key, const toml::node& node,
@@ -181,6 +190,16 @@ absl::Status Check(const Options& options) {
   });
   RETURN_IF_ERROR(status);
   return CheckTogether(options);
+}
+
+/// CLI11 would read "true" as the number 1.
+void RefuseWordsForNumbers(CLI::App& app) {
+  CLI::Validator is_number = CLI::Number;
+  is_number.description("");
+  for (CLI::Option* const option : app.get_options()) {
+    const std::string type = option->get_type_name();
+    if (type == "INT" || type == "UINT" || type == "FLOAT") option->check(is_number);
+  }
 }
 
 void AddFlags(CLI::App& app, Options& options) {
@@ -310,6 +329,7 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
                  "[carillond.toml in $CONFIGURATION_DIRECTORY]");
   AddManualFlag(app, 8, version);
   AddFlags(app, command.options);
+  RefuseWordsForNumbers(app);
   AddDatabaseCommands(app, command);
   app.add_flag("--print-config", command.only_print,
                "print the settings in force, as a configuration file, and end");

@@ -6,6 +6,7 @@
 
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/open_device.h"
+#include "server/metrics/metrics_address.h"
 
 namespace carillon {
 namespace {
@@ -59,6 +60,9 @@ absl::Status CheckRooms(const Options& options) {
     RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
   }
   RETURN_IF_ERROR(CheckDevice(options.audio_device));
+  if (!options.metrics_address.empty()) {
+    RETURN_IF_ERROR(CheckMetricsAddress(options.metrics_address));
+  }
   return ApiServer::Check(ApiSettingsOf(options), options.sample_rate_hz);
 }
 

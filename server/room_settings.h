@@ -15,9 +15,9 @@ LocalExecutorOptions LocalExecutorOptionsOf(const Options& options);
 OutputSettings OutputSettingsOf(const Options& options);
 ApiSettings ApiSettingsOf(const Options& options);
 
-/// Checks what the rooms will make of the settings, as far as this needs no device and no socket
-/// and changes nothing. Errors: those of DataDirectory::Check, CheckLocalExecutor, CheckDevice and
-/// ApiServer::Check.
+/// Checks what the rooms will make of the settings, as far as this opens no device, listens at no
+/// address and changes nothing. Errors: those of DataDirectory::Check, CheckLocalExecutor,
+/// CheckDevice, CheckMetricsAddress and ApiServer::Check.
 absl::Status CheckRooms(const Options& options);
 
 }  // namespace carillon

@@ -5,6 +5,8 @@
 #include <array>
 
 #include "absl/algorithm/container.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -42,11 +44,17 @@ constexpr auto kRanges = std::to_array<Range>({
 
 constexpr auto kLogLevels = std::to_array<absl::string_view>({"debug", "info", "warning", "error"});
 
-bool IsHostAndPort(absl::string_view text) {
+/// Returns the host of one HOST:PORT, or nothing if `text` is not one. A name or an address has
+/// neither commas nor spaces; civetweb would take a comma for the begin of another address.
+absl::string_view HostOf(absl::string_view text) {
   const size_t colon = text.rfind(':');
+  if (colon == absl::string_view::npos || absl::StrContains(text, ',') ||
+      absl::c_any_of(text, absl::ascii_isspace)) {
+    return "";
+  }
   int port = 0;
-  return colon != absl::string_view::npos && colon > 0 &&
-         absl::SimpleAtoi(text.substr(colon + 1), &port) && port > 0 && port < 65536;
+  const bool has_port = absl::SimpleAtoi(text.substr(colon + 1), &port);
+  return has_port && port > 0 && port < 65536 ? text.substr(0, colon) : "";
 }
 
 }  // namespace
@@ -74,17 +82,24 @@ absl::Status CheckText(absl::string_view key, absl::string_view name, absl::stri
   if (key == "data_dir" && value.empty()) {
     return InvalidConfiguration(absl::StrCat(name, " names no folder"));
   }
-  if (value.empty() || IsHostAndPort(value)) return absl::OkStatus();
-  if (key == "slurm_upload") {
+  const absl::string_view host = HostOf(value);
+  if (key == "slurm_upload" && !value.empty() && host.empty()) {
     return InvalidConfiguration(absl::StrCat(is, "HOST:PORT, as the nodes reach it"));
   }
-  if (key == "metrics")
-    return InvalidConfiguration(absl::StrCat(is, "HOST:PORT, as 127.0.0.1:9464"));
+  if (key == "metrics" && !value.empty() && (host.empty() || absl::StrContains(host, ':'))) {
+    return InvalidConfiguration(absl::StrCat(
+        is, "one HOST:PORT with an IPv4 address or a name, as 127.0.0.1:9464; IPv6 is not served"));
+  }
   return absl::OkStatus();
 }
 
 absl::Status CheckTogether(const Options& options) {
   if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
+  if (absl::c_linear_search(options.addresses, options.metrics_address)) {
+    return InvalidConfiguration(absl::StrCat("--listen and --metrics both name ",
+                                             options.metrics_address,
+                                             ": give one of them another port"));
+  }
   if (options.tls_certificate_file.empty() != options.tls_key_file.empty()) {
     return InvalidConfiguration("--tls-certificate and --tls-key must be given together");
   }

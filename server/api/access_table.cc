@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
@@ -21,6 +22,7 @@ namespace carillon {
 namespace {
 
 constexpr char kReason[] = "ACCESS_FILE_UNUSABLE";
+constexpr absl::string_view kByteOrderMark = "\xEF\xBB\xBF";  // in UTF-8
 constexpr std::array kRoles = {Role::kListen, Role::kStrike, Role::kSubmit, Role::kAdminister};
 
 absl::Status WrongLine(absl::string_view why) {
@@ -82,6 +84,12 @@ AccessTable AccessTable::ForThisMachine() {
 
 absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string content, ReadPrivateFile(path, kReason));
+  if (absl::StartsWith(content, kByteOrderMark)) {
+    return WrongLine(absl::StrCat(
+        path,
+        " line 1: the file begins with a byte order mark (bytes EF BB BF), which would be "
+        "taken for a part of the first word: save it as UTF-8 without a byte order mark"));
+  }
   AccessTable table;
   EarlierLines earlier;
   int number = 0;

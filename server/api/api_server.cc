@@ -94,6 +94,11 @@ absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& sett
                                   " can be reached from the network; say who may do what there: "
                                   "give --access-file"));
     }
+    if (std::ranges::any_of(
+            addresses, [&](const ListenAddress& other) { return IsSameAddress(address, other); })) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+                     absl::StrCat("--listen names ", text, " twice: name each address once"));
+    }
     addresses.push_back(std::move(address));
   }
   return addresses;

@@ -32,9 +32,9 @@ struct Outcome {
   /// Set with kOutOfMemory if the worker kept to its own limit, but all workers together exceeded
   /// the budget. The task may succeed if it runs alone.
   bool crowded = false;
-  /// Set if somebody else ended the worker. With kOutOfMemory that was the system for lack of
-  /// memory, or a person by mistake, which cannot be told apart. With kCrashed it was a signal that
-  /// the system does not send for lack of memory.
+  /// Set if somebody else ended the worker. With kOutOfMemory the kernel has killed a process for
+  /// lack of memory while the worker ran, and this one was the first to be killed. With kCrashed it
+  /// has killed none, or its count cannot be read, or the signal was one that it does not send.
   bool killed = false;
 };
 

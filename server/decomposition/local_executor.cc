@@ -179,8 +179,8 @@ class LocalExecutor final : public Executor {
 
   void StartWorker(PreparedTask prepared) {
     const auto on_end = prepared.task.on_end;
-    absl::StatusOr<LocalWorker> worker = LocalWorker::Start(std::move(prepared), options_.program,
-                                                            share_, limits_, clock_.Monotonic());
+    absl::StatusOr<LocalWorker> worker =
+        LocalWorker::Start(std::move(prepared), system_, share_, limits_, clock_.Monotonic());
     if (worker.ok()) {
       workers_.push_back(*std::move(worker));
     } else {
@@ -232,6 +232,7 @@ class LocalExecutor final : public Executor {
   }
 
   const LocalExecutorOptions options_;
+  const WorkerSystem system_{options_.program, options_.kernel_counts};
   const WorkerLimits limits_{options_.memory_limit_bytes, options_.time_limit,
                              options_.stall_limit};
   const WorkerShare share_{options_.threads_per_worker,

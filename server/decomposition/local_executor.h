@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "server/base/clock.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/oom_kills.h"
 
 namespace carillon {
 
@@ -23,6 +24,7 @@ struct LocalExecutorOptions {
   std::chrono::milliseconds time_limit = std::chrono::hours(6);
   /// Longest time without an event.
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
+  std::filesystem::path kernel_counts = kKernelCounts;  ///< see OomKillCount
 };
 
 /// Checks the options without making anything. Errors: FailedPrecondition (WORKER_NOT_FOUND:

@@ -13,6 +13,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
+#include "server/decomposition/oom_kills.h"
 #include "server/decomposition/worker_command.h"
 
 namespace carillon {
@@ -53,11 +54,11 @@ bool ComesFromOutside(int signal) {
   return signal == SIGTERM || signal == SIGINT || signal == SIGHUP || signal == SIGQUIT;
 }
 
-v1::ErrorInfo EndedFromOutside(int signal) {
+v1::ErrorInfo EndedFromOutside(int signal, absl::string_view whence) {
   return InternalError(
       "WORKER_CRASHED",
-      absl::StrCat("the decomposing process was ended by signal ", signal,
-                   " from outside: see who ends processes of this user, and try again"));
+      absl::StrCat("the decomposing process was ended by signal ", signal, " ", whence,
+                   ": see who ends processes of this user, and try again"));
 }
 
 // The log may hold any bytes; a message is one line of text.
@@ -110,14 +111,14 @@ absl::StatusOr<PreparedTask> PreparedTask::Make(DecompositionTask task,
   return PreparedTask{std::move(task), std::move(folder)};
 }
 
-absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
-                                               const std::filesystem::path& program,
+absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared, const WorkerSystem& system,
                                                const WorkerShare& share, const WorkerLimits& limits,
                                                nanoseconds now) {
   const ScratchFolder& folder = prepared.folder;
-  const WorkerPlace place{program, folder / "mesh", folder / "request", folder / "model",
+  const WorkerPlace place{system.program, folder / "mesh", folder / "request", folder / "model",
                           share.thread_count};
   const WorkerLimits own = limits.For(prepared.task.request);
+  const std::optional<uint64_t> oom_kill_count = OomKillCount(system.kernel_counts);
   ASSIGN_OR_RETURN(Pipe events, MakePipe());
   ASSIGN_OR_RETURN(Pipe errors, MakePipe());
   ASSIGN_OR_RETURN(
@@ -130,8 +131,11 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared,
            .worker_nice = prepared.task.radiates ? kTransferNice : kDecompositionNice}));
   events.CloseWriteEnd();
   errors.CloseWriteEnd();
-  return LocalWorker(std::move(prepared), std::move(events), std::move(errors), std::move(process),
+  LocalWorker worker(std::move(prepared), std::move(events), std::move(errors), std::move(process),
                      own, now);
+  worker.kernel_counts_ = system.kernel_counts;
+  worker.earlier_oom_kill_count_ = oom_kill_count;
+  return worker;
 }
 
 void LocalWorker::Read(nanoseconds now) {
@@ -225,16 +229,27 @@ Outcome LocalWorker::Judge(const ProcessEnd& end) const {
   return {Verdict::kOk, {}, folder_ / "model"};
 }
 
-Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
-  if (!end.exited && end.status == SIGKILL) {
-    Outcome outcome{Verdict::kOutOfMemory,
-                    OutOfMemory(absl::StrCat("was killed by the system", WouldNeed(node_count_))),
-                    {}};
-    outcome.killed = true;
-    return outcome;
+Outcome LocalWorker::JudgeKill() const {
+  const std::optional<uint64_t> count = OomKillCount(kernel_counts_);
+  Outcome outcome;
+  outcome.killed = true;
+  if (count.has_value() && count > earlier_oom_kill_count_) {
+    outcome.verdict = Verdict::kOutOfMemory;
+    outcome.error = OutOfMemory(
+        absl::StrCat("was killed by the system for lack of memory", WouldNeed(node_count_)));
+  } else {
+    outcome.error = EndedFromOutside(
+        SIGKILL, count.has_value()
+                     ? "from outside, and not by the kernel for lack of memory"
+                     : "from outside, by the kernel for lack of memory or by somebody else");
   }
+  return outcome;
+}
+
+Outcome LocalWorker::JudgeFailure(const ProcessEnd& end) const {
+  if (!end.exited && end.status == SIGKILL) return JudgeKill();
   if (!end.exited && ComesFromOutside(end.status)) {
-    Outcome outcome{Verdict::kCrashed, EndedFromOutside(end.status), {}};
+    Outcome outcome{Verdict::kCrashed, EndedFromOutside(end.status, "from outside"), {}};
     outcome.killed = true;
     return outcome;
   }

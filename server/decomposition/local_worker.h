@@ -41,6 +41,12 @@ struct WorkerLimits {
   WorkerLimits For(const v1::CreateModalModelRequest& request) const;
 };
 
+/// Where a worker's program and the kernel's counts are.
+struct WorkerSystem {
+  std::filesystem::path program;
+  std::filesystem::path kernel_counts;  ///< see OomKillCount
+};
+
 /// The share of the processors that a worker gets.
 struct WorkerShare {
   int thread_count = 1;
@@ -63,8 +69,7 @@ struct PreparedTask {
 class LocalWorker {
  public:
   /// Starts the program. Errors: those of ChildProcess::Start.
-  static absl::StatusOr<LocalWorker> Start(PreparedTask prepared,
-                                           const std::filesystem::path& program,
+  static absl::StatusOr<LocalWorker> Start(PreparedTask prepared, const WorkerSystem& system,
                                            const WorkerShare& share, const WorkerLimits& limits,
                                            std::chrono::nanoseconds now);
   const DecompositionTask& task() const { return task_; }
@@ -106,6 +111,7 @@ class LocalWorker {
   void Kill(Verdict verdict, v1::ErrorInfo error);
   Outcome Judge(const ProcessEnd& end) const;
   Outcome JudgeFailure(const ProcessEnd& end) const;
+  Outcome JudgeKill() const;
 
   DecompositionTask task_;
   ScratchFolder folder_;  // destroyed after the process
@@ -113,7 +119,9 @@ class LocalWorker {
   Pipe error_pipe_;
   ChildProcess process_;
   WorkerLimits limits_;
-  uint64_t resident_bytes_ = 0;  // newest measurement
+  std::filesystem::path kernel_counts_;
+  std::optional<uint64_t> earlier_oom_kill_count_;  // when the process was started
+  uint64_t resident_bytes_ = 0;                     // newest measurement
   uint64_t peak_bytes_ = 0;
   uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;

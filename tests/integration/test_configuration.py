@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `carillond --check-config` finds in a configuration, and that a start finds the same."""
 
+import json
 import pathlib
+import socket
 import subprocess
 import tempfile
 import unittest
@@ -17,7 +19,7 @@ class ConfigurationTest(unittest.TestCase):
     def run_daemon(self, settings, *arguments):
         """Runs carillond with a configuration with these settings."""
         usual = {"data_dir": f"{self.folder}/data", "listen": [f"unix:{self.folder}/socket"], "audio_device": "null"}
-        self.file.write_text("".join(f"{key} = {value!r}\n" for key, value in (usual | settings).items()))
+        self.file.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in (usual | settings).items()))
         return subprocess.run([BIN / "carillond", "--config", self.file, *arguments], capture_output=True, text=True,
                               check=False, timeout=60)
 
@@ -30,6 +32,19 @@ class ConfigurationTest(unittest.TestCase):
                                  ({"listen": [f"unix:{self.folder}/empty"]}, "LISTEN_FAILED"),
                                  ({"listen": ["127.0.0.1:0"], "tls_certificate": "/nope", "tls_key": "/nope"},
                                   "TLS_UNUSABLE"),
+                                 ({"listen": ["127.0.0.1:5001", "unix:/tmp/a", "127.0.0.1:5001"]},
+                                  "INVALID_ADDRESS: --listen names 127.0.0.1:5001 twice"),
+                                 ({"listen": [f"unix:{self.folder}/a", f"unix:{self.folder}/b/../a"]},
+                                  "INVALID_ADDRESS: --listen names unix:"),
+                                 ({"metrics": "no.such.host.invalid:9464"},
+                                  "LISTEN_FAILED: cannot serve metrics on no.such.host.invalid:9464: "),
+                                 # An address for documentation, which no machine has (RFC 5737).
+                                 ({"metrics": "192.0.2.1:9464"}, "LISTEN_FAILED: cannot serve metrics on "
+                                  "192.0.2.1:9464: Cannot assign requested address; let --metrics name a free port"),
+                                 ({"metrics": "[::1]:9464"}, f"INVALID_CONFIGURATION: {self.file} line 4: metrics is"),
+                                 ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"},
+                                  f"INVALID_CONFIGURATION: {self.file} line 4: metrics is"),
+                                 ({"workers": True}, f"INVALID_CONFIGURATION: {self.file} line 4: workers has a value"),
                                  ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
                                  ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
                                  ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
@@ -47,7 +62,8 @@ class ConfigurationTest(unittest.TestCase):
         self.assertEqual(sorted(self.folder.iterdir()), files)  # nothing was made
 
     def test_what_a_start_takes_is_valid_and_the_check_makes_nothing(self):
-        for settings in ({}, {"listen": ["127.0.0.1:0"]}, {"listen": [f"unix:{self.folder}/a/b/socket"]},
+        for settings in ({}, {"listen": ["127.0.0.1:0", "127.0.0.1:0"]}, {"metrics": "localhost:9464"},
+                         {"listen": ["127.0.0.1:0"]}, {"listen": [f"unix:{self.folder}/a/b/socket"]},
                          {"data_dir": f"{self.folder}/a/b/c"}, {"audio_device": f"file:{self.folder}/a.wav"},
                          {"executor": "slurm", "precompute": "/on/each/node"}):
             with self.subTest(settings=settings):
@@ -55,6 +71,16 @@ class ConfigurationTest(unittest.TestCase):
                 self.assertEqual((checked.returncode, checked.stdout), (0, "the configuration is valid\n"),
                                  checked.stderr)
         self.assertEqual(list(self.folder.iterdir()), [self.file])
+
+    def test_metrics_at_a_port_that_is_taken_are_valid_but_stop_a_start_with_the_cause(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            metrics = f"127.0.0.1:{taken.getsockname()[1]}"
+            checked = self.run_daemon({"metrics": metrics}, "--check-config")
+            started = self.run_daemon({"metrics": metrics})
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+        self.assertEqual(started.returncode, 1)
+        self.assertIn(f"error: ADDRESS_IN_USE: cannot serve metrics on {metrics}: Address already in use; let "
+                      "--metrics", started.stderr)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,11 @@ class OptionsFile : public testing::Test {
     return file_.c_str();
   }
 
+  void ExpectRefused(const std::string& text, const char* named) {
+    EXPECT_THAT(Read({"--config", Write(text)}).status().ToString(),
+                testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr(named)));
+  }
+
  private:
   TemporaryFolder folder_;
   std::filesystem::path file_ = folder_ / "carillond.toml";
@@ -70,10 +75,7 @@ TEST_F(OptionsFile, ListenMayBeGivenMoreThanOnceAndReplacesTheFiles) {
 }
 
 TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
-  const auto expect = [&](const char* text, const char* named) {
-    EXPECT_THAT(Read({"--config", Write(text)}).status().ToString(),
-                testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr(named)));
-  };
+  const auto expect = [&](const char* text, const char* named) { ExpectRefused(text, named); };
   expect("volume = 11\n", "volume");
   expect("sample_rate = \"high\"\n", "sample_rate");
   expect("\nsample_rate = 100\n", " line 2: sample_rate is 100; it must be 8000 to 192000");
@@ -97,11 +99,45 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   }
 }
 
+TEST_F(OptionsFile, AValueOfAnotherTypeIsRefusedWithTheTypeThatIsWanted) {
+  ExpectRefused("workers = true\n",
+                " line 1: workers has a value of the wrong type or size; write a whole");
+  ExpectRefused("gain = false\n",
+                " line 1: gain has a value of the wrong type or size; write a number");
+  ExpectRefused("transfers = \"yes\"\n",
+                " line 1: transfers has a value of the wrong type or size; write true");
+  ExpectRefused("data_dir = true\n",
+                " line 1: data_dir has a value of the wrong type or size; write a text");
+  ExpectRefused("listen = [true]\n", " line 1: listen has a value of the wrong type");
+  ExpectRefused("workers = [1]\n", " line 1: workers has a value of the wrong type");
+  ExpectRefused("workers = 1.5\n", " line 1: workers has a value of the wrong type");
+  ExpectRefused("job_time = 2026-11-27\n", " line 1: job_time has a value of the wrong type");
+}
+
+TEST_F(OptionsFile, MetricsHaveOneAddress) {
+  for (const char* address : {"a:1,b:2", "127.0.0.1:1,2", "127.0.0.1: 1", "127.0.0.1 :1", "[::1]:1",
+                              "::1:1", ":1", "127.0.0.1:1s"}) {
+    ExpectRefused(std::string("metrics = \"") + address + "\"\n",
+                  "; it must be one HOST:PORT with an IPv4 address or a name");
+  }
+  ExpectRefused("listen = \"127.0.0.1:1\"\nmetrics = \"127.0.0.1:1\"\n",
+                "--listen and --metrics both name 127.0.0.1:1");
+}
+
 TEST(Options, AFlagOutOfRangeIsNamedAsItIsWritten) {
   EXPECT_THAT(Read({"--sample-rate", "1"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: --sample-rate is 1; it must be 8000 to 192000"));
   EXPECT_THAT(Read({"--scene-grace", "nan"}).status().ToString(),
               HasSubstr("--scene-grace is nan"));
+}
+
+TEST(Options, AWordIsNoNumberOnTheCommandLine) {
+  for (const char* flag : {"--workers", "--sample-rate", "--queue-limit", "--gain"}) {
+    testing::internal::CaptureStderr();
+    const absl::StatusOr<CommandLine> command = Read({flag, "true"});
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr(flag));
+    EXPECT_EQ(command->exit_status, 2) << flag;
+  }
 }
 
 TEST(Options, AFileThatIsNotThereIsRefused) {

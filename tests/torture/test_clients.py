@@ -2,10 +2,12 @@
 """What clients leave behind when they die, and what one client can take from the others."""
 
 import re
+import selectors
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import unittest
 import urllib.request
@@ -47,6 +49,38 @@ def free_port():
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))
         return bound.getsockname()[1]
+
+
+class SilentConnections(threading.Thread):
+    """Keeps `count` connections to a port that say nothing; each is replaced as soon as it is closed."""
+
+    def __init__(self, port, count):
+        super().__init__()
+        self.port, self.count, self.closed_count = port, count, 0
+        self.stopped = threading.Event()
+
+    def run(self):
+        with selectors.DefaultSelector() as selector:
+            for _ in range(self.count):
+                self.connect(selector)
+            while not self.stopped.is_set():
+                for key, _ in selector.select(0.1):
+                    selector.unregister(key.fileobj)
+                    key.fileobj.close()
+                    self.closed_count += 1
+                    self.connect(selector)
+            for key in list(selector.get_map().values()):
+                key.fileobj.close()
+
+    def connect(self, selector):
+        connection = socket.socket()
+        connection.setblocking(False)
+        connection.connect_ex(("127.0.0.1", self.port))
+        selector.register(connection, selectors.EVENT_READ)
+
+    def stop(self):
+        self.stopped.set()
+        self.join()
 
 
 class Client:
@@ -211,6 +245,23 @@ class ClientTest(torture.ServedTest):
                 start=contact_service_pb2.ContactStreamStart(scene=scene.scene, step_s=0.01)),
             contact_service_pb2.StreamContactsRequest(step=contact_pb2.ContactStep(impulses=[bad]))])))
         self.assertEqual(read()['carillon_impulses_rejected_total{reason="OBJECT_NOT_FOUND"}'], "1")
+
+    def test_metrics_are_read_within_prometheus_s_limit_beside_400_connections_that_say_nothing(self):
+        port = free_port()
+        self.serve("--metrics", f"127.0.0.1:{port}")
+        silent = SilentConnections(port, 400)
+        silent.start()
+        self.addCleanup(silent.stop)
+        torture.wait_until(lambda: silent.closed_count > 100, 60)
+        taken_s = []
+        for _ in range(3):
+            begin_s = time.monotonic()
+            # Prometheus waits for 10 s.
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+                self.assertIn(b"carillon_build_info", answer.read())
+            taken_s.append(time.monotonic() - begin_s)
+        print(f"beside 400 silent connections the metrics were read in {max(taken_s):.1f} s", flush=True)
+        self.assertLess(max(taken_s), 10)
 
 
 if __name__ == "__main__":

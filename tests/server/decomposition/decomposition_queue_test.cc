@@ -159,16 +159,22 @@ TEST_F(DecompositionQueueTest, AWorkerThatIsKilledOnceRunsAgainInTheSameWay) {
   EXPECT_EQ(RunCount(), 2U);
 }
 
-TEST_F(DecompositionQueueTest, AWorkerThatIsKilledTwiceLacksMemory) {
-  MakeQueue(absl::StrCat(kCount, "kill -KILL $$"));
+TEST_F(DecompositionQueueTest, AWorkerThatTheKernelKillsTwiceLacksMemory) {
+  options_.kernel_counts = folder_ / "vmstat";
+  WriteBytes(options_.kernel_counts, "oom_kill 0\n");
+  MakeQueue(absl::StrCat(
+      kCount, "echo \"oom_kill $(wc -l <\"$here/runs\")\" >\"$here/vmstat\"\nkill -KILL $$"));
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "OUT_OF_MEMORY");
   EXPECT_EQ(RunCount(), 2U);
 }
 
 TEST_F(DecompositionQueueTest, AWorkerThatIsEndedFromOutsideTwiceFailsButNotForEver) {
-  MakeQueue(absl::StrCat(kCount, "kill -TERM $$"));
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");
-  EXPECT_EQ(RunCount(), 2U) << "no other way of computing";
+  for (const char* signal : {"TERM", "KILL"}) {
+    std::filesystem::remove(folder_ / "runs");
+    MakeQueue(absl::StrCat(kCount, "kill -", signal, " $$"));
+    EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED") << signal;
+    EXPECT_EQ(RunCount(), 2U) << "no other way of computing";
+  }
   MakeQueue(kSucceed);
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
 }

@@ -180,8 +180,34 @@ TEST_F(LocalExecutorTest, AnExitStatusWithoutAReasonIsACrash) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("exit status 3"));
 }
 
-TEST_F(LocalExecutorTest, AKillThatIsNotOursIsTakenForTheKernelsMemoryKiller) {
-  EXPECT_EQ(RunScript("kill -KILL $$").verdict, Verdict::kOutOfMemory);
+TEST_F(LocalExecutorTest, AKillIsTheKernelsForLackOfMemoryIfTheKernelSaysSo) {
+  options_.kernel_counts = folder_ / "vmstat";
+  WriteBytes(options_.kernel_counts, "pgfault 7\noom_kill 3\nballoon_inflate 0\n");
+  const Outcome outcome = RunScript("echo 'oom_kill 4' >\"$here/vmstat\"; kill -KILL $$");
+  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.error.reason(), "OUT_OF_MEMORY");
+  EXPECT_THAT(outcome.error.message(), HasSubstr("by the system for lack of memory"));
+}
+
+TEST_F(LocalExecutorTest, AKillWithoutALackOfMemoryIsSomebodyElses) {
+  options_.kernel_counts = folder_ / "vmstat";
+  WriteBytes(options_.kernel_counts, "oom_kill 3\n");
+  const Outcome outcome = RunScript("kill -KILL $$");
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
+  EXPECT_THAT(
+      outcome.error.message(),
+      HasSubstr("signal 9 from outside, and not by the kernel for lack of memory: see who"));
+}
+
+TEST_F(LocalExecutorTest, AKillNamesBothCausesIfTheKernelDoesNotCount) {
+  options_.kernel_counts = folder_ / "vmstat";
+  const Outcome outcome = RunScript("kill -KILL $$");
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
+  EXPECT_THAT(outcome.error.message(),
+              HasSubstr("signal 9 from outside, by the kernel for lack of memory or by somebody"));
 }
 
 TEST_F(LocalExecutorTest, KillsAWorkerThatTakesTooMuchMemory) {
@@ -212,8 +238,12 @@ TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
   v1::WorkerEvent event;
   event.mutable_progress()->set_node_count(1'000'000);
   WriteEvents(EventBytes(event));
-  EXPECT_THAT(RunScript("cat \"$here/events\" >&3; kill -KILL $$").error.message(),
-              HasSubstr("with its 1000000 nodes it would need about 62"));
+  options_.kernel_counts = folder_ / "vmstat";
+  WriteBytes(options_.kernel_counts, "oom_kill 0\n");
+  EXPECT_THAT(
+      RunScript("cat \"$here/events\" >&3; echo 'oom_kill 1' >\"$here/vmstat\"; kill -KILL $$")
+          .error.message(),
+      HasSubstr("with its 1000000 nodes it would need about 62"));
 }
 
 TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchTheYoungestMakesRoom) {
