@@ -158,7 +158,7 @@ TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) 
   const std::vector<std::string> before = Names();
   const path foreign = folder_ / "foreign";
   ASSERT_TRUE((*SqliteConnection::Open(foreign))->RunScript("CREATE TABLE models (digest)").ok());
-  std::ofstream(folder_ / "empty");
+  { const std::ofstream empty(folder_ / "empty"); }
   std::ofstream(folder_ / "text") << std::string(5000, 'x');
   for (const char* name : {"foreign", "empty", "text"}) {
     EXPECT_THAT(RestoreDatabase(file_, folder_ / name).status().ToString(),
