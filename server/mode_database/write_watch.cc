@@ -20,11 +20,60 @@ std::string NewName() {
   return absl::StrCat("carillon-", ++count);
 }
 
+/// The log's index, which all processes that use SQLite on the database share in memory. Whoever
+/// changes the log or copies it into the database holds a lock meanwhile, and changes the header.
+class LogIndex {
+ public:
+  LogIndex(MappingGuard& guard, WrittenFile& database, WrittenFile& log)
+      : guard_(guard), database_(database), log_(log) {}
+
+  /// Notes that SQLite has mapped a piece of the index into memory.
+  void Map(int region, volatile void* mapped, int size) {
+    guard_.Guard(mapped, static_cast<size_t>(size));
+    if (region == 0) header_ = static_cast<volatile char*>(mapped);
+  }
+
+  void Unmap() {
+    guard_.Release();
+    header_ = nullptr;
+    seen_.clear();
+  }
+
+  /// Compares the header, after this process has got the lock, with that of its last Leave.
+  void Enter() {
+    if (seen_.empty() || header_ == nullptr || Header() == seen_) return;
+    database_.ForgetHead();
+    log_.ForgetHead();
+  }
+
+  /// Remembers the header, before this process gives back the lock.
+  void Leave() {
+    if (header_ != nullptr) seen_ = Header();
+  }
+
+ private:
+  std::string Header() const {
+    std::string header(kHeaderBytes, '\0');
+    std::copy(header_, header_ + kHeaderBytes, header.begin());
+    return header;
+  }
+
+  // https://www.sqlite.org/walformat.html#the_wal_index_file_format: two copies of the header, and
+  // the number of frames that were copied into the database.
+  static constexpr int kHeaderBytes = 100;
+
+  MappingGuard& guard_;
+  WrittenFile& database_;
+  WrittenFile& log_;
+  volatile char* header_ = nullptr;
+  std::string seen_;
+};
+
 /// A file of SQLite that is watched. SQLite's own file lies behind it in memory.
 struct WatchedFile {
   sqlite3_file base;
   WrittenFile* written;
-  MappingGuard* index;
+  LogIndex* index;
 };
 
 sqlite3_file& Real(sqlite3_file* file) {
@@ -50,21 +99,31 @@ int Truncate(sqlite3_file* file, sqlite3_int64 size) {
   return WrittenOf(file).Truncate(Real(file), size);
 }
 
-MappingGuard& IndexOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->index; }
+LogIndex& IndexOf(sqlite3_file* file) { return *reinterpret_cast<WatchedFile*>(file)->index; }
 
 int MapIndex(sqlite3_file* file, int region, int size, int extend, volatile void** mapped) {
   sqlite3_file& real = Real(file);
   const int result = real.pMethods->xShmMap(&real, region, size, extend, mapped);
   if (result == SQLITE_OK && *mapped != nullptr) {
-    IndexOf(file).Guard(*mapped, static_cast<size_t>(size));
+    IndexOf(file).Map(region, *mapped, size);
   }
   return result;
 }
 
 int UnmapIndex(sqlite3_file* file, int remove) {
-  IndexOf(file).Release();
+  IndexOf(file).Unmap();
   sqlite3_file& real = Real(file);
   return real.pMethods->xShmUnmap(&real, remove);
+}
+
+int LockIndex(sqlite3_file* file, int offset, int count, int flags) {
+  constexpr int kLastLockOfWriters = 1;  // after the lock of changes that of copies
+  sqlite3_file& real = Real(file);
+  const bool writes = offset <= kLastLockOfWriters && (flags & SQLITE_SHM_EXCLUSIVE) != 0;
+  if (writes && (flags & SQLITE_SHM_UNLOCK) != 0) IndexOf(file).Leave();
+  const int result = real.pMethods->xShmLock(&real, offset, count, flags);
+  if (writes && (flags & SQLITE_SHM_LOCK) != 0 && result == SQLITE_OK) IndexOf(file).Enter();
+  return result;
 }
 
 using Io = sqlite3_io_methods;
@@ -82,7 +141,7 @@ const Io kWatched = {.iVersion = 3,
                      .xSectorSize = Forward<&Io::xSectorSize>,
                      .xDeviceCharacteristics = Forward<&Io::xDeviceCharacteristics>,
                      .xShmMap = MapIndex,
-                     .xShmLock = Forward<&Io::xShmLock>,
+                     .xShmLock = LockIndex,
                      .xShmBarrier = Forward<&Io::xShmBarrier>,
                      .xShmUnmap = UnmapIndex,
                      .xFetch = Forward<&Io::xFetch>,
@@ -116,11 +175,13 @@ void WrittenFile::Open(sqlite3_file& file) {
 
 void WrittenFile::ReadHead(sqlite3_file& file) {
   head_ = HeadNow(file, std::min(SizeNow(file), kHeadBytes)).value_or("");
+  knows_head_ = true;
 }
 
 /// A file that cannot be read counts as unchanged, because what SQLite does next fails by itself.
 bool WrittenFile::HasHead(sqlite3_file& file) {
   const MutexLock lock(&mutex_);
+  if (!knows_head_) ReadHead(file);
   lost_ = lost_ || HeadNow(file, std::ssize(head_)).value_or(head_) != head_;
   return !lost_;
 }
@@ -130,6 +191,11 @@ void WrittenFile::NoteHead(const void* data, int size, int64_t offset) {
   const int64_t end = std::min(offset + size, kHeadBytes);
   head_.resize(std::max<size_t>(head_.size(), end), '\0');
   std::memcpy(head_.data() + offset, data, end - offset);
+}
+
+void WrittenFile::ForgetHead() {
+  const MutexLock lock(&mutex_);
+  knows_head_ = false;
 }
 
 bool WrittenFile::IsWhole(absl::FunctionRef<int64_t()> look) {
@@ -177,7 +243,7 @@ struct WriteWatch::Layer {
         vfs(real),
         database(watch.database_),
         log(watch.log_),
-        index(watch.index_) {
+        index(watch.index_, watch.database_, watch.log_) {
     vfs.zName = watch.name_.c_str();
     vfs.pAppData = this;
     vfs.szOsFile += static_cast<int>(sizeof(WatchedFile));
@@ -210,7 +276,7 @@ struct WriteWatch::Layer {
   sqlite3_vfs vfs;
   WrittenFile& database;
   WrittenFile& log;
-  MappingGuard& index;
+  LogIndex index;
 };
 
 WriteWatch::WriteWatch() : name_(NewName()), layer_(std::make_unique<Layer>(*this)) {}

@@ -29,6 +29,9 @@ class WrittenFile {
   /// returns the file's size. Once this has returned false, it always does.
   bool IsWhole(absl::FunctionRef<int64_t()> look);
 
+  /// Notes that another process has changed the file by SQLite, so that it has other first bytes.
+  void ForgetHead();
+
   /// Lets all later calls of Write and Truncate fail.
   void Close();
 
@@ -51,13 +54,15 @@ class WrittenFile {
   int64_t byte_count_ ABSL_GUARDED_BY(mutex_) = 0;
   /// The header of a database has 100 bytes, and that of a log 32.
   std::string head_ ABSL_GUARDED_BY(mutex_);
+  bool knows_head_ ABSL_GUARDED_BY(mutex_) = false;
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
 /// A layer between SQLite and the operating system (a VFS) that knows what SQLite has written to a
 /// database file and its write-ahead log. It looks at a file's size and first bytes before each
 /// write, because a write beyond the end of a truncated file makes the file as large as it was. It
-/// also guards the mapping of the log's index (the -shm file).
+/// also guards the mapping of the log's index (the -shm file), whose header tells it whether
+/// another process has changed the files by SQLite.
 class WriteWatch {
  public:
   /// Adds the layer to SQLite under a new name.

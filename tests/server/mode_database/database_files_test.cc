@@ -21,6 +21,7 @@
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_keeper.h"
 #include "server/mode_database/mode_database.h"
+#include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
@@ -134,6 +135,27 @@ TEST_F(DatabaseFilesTest, AfterALargerDatabaseWasCopiedOverTheFileNothingIsAckno
   EXPECT_THAT(Put("new").ToString(), HasSubstr("DATABASE_LOST: "));
   database_.reset();
   EXPECT_EQ(ReadBytes(file_), larger);
+}
+
+TEST_F(DatabaseFilesTest, AChangeThatAnotherProgramMakesBySqliteIsNoDamage) {
+  constexpr const char* kChanges[] = {
+      "UPDATE models SET label = label || 'x';", "PRAGMA wal_checkpoint(PASSIVE);",
+      "PRAGMA wal_checkpoint(RESTART); UPDATE models SET label = label || 'x';",
+      "UPDATE models SET label = label || 'x'; PRAGMA wal_checkpoint(RESTART);",
+      "CREATE TABLE IF NOT EXISTS other (bytes); INSERT INTO other VALUES (zeroblob(9000000));"};
+  int count = 0;
+  for (int round = 0; round < 3; ++round) {
+    for (const char* change : kChanges) {
+      {
+        const auto other = *SqliteConnection::Open(file_);
+        ASSERT_TRUE(other->RunScript(change).ok()) << change;
+      }
+      const absl::Status stored = Put(std::to_string(++count));
+      ASSERT_TRUE(stored.ok()) << stored << change;
+      ASSERT_TRUE(StoreMuch(database_->database(), [] {}).ok()) << change;
+    }
+  }
+  ExpectLost([&] { Overwrite(log_, std::string(std::filesystem::file_size(log_), '\0')); });
 }
 
 TEST_F(DatabaseFilesTest, AfterTheLogWasOverwrittenInPlaceNothingIsAcknowledged) {
