@@ -85,7 +85,8 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
         const auto check = [&](const std::string& model, const v1::Material& material) {
           return MayRemember(model, material, caller);
         };
-        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check));
+        ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check,
+                                                                 caller.has(Role::kAdminister)));
         daemon_.writing.events.LogSubmitted(Submitted(response->job()), caller);
         return absl::OkStatus();
       });
@@ -100,8 +101,9 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
         v1::CreateTransferRequest whole = *request;
         ASSIGN_OR_RETURN(*whole.mutable_material(),
                          MaterialOrModels(request->material(), digest, database_.models()));
-        ASSIGN_OR_RETURN(*response->mutable_job(),
-                         queue_.SubmitTransfer(digest, whole, caller.client));
+        ASSIGN_OR_RETURN(
+            *response->mutable_job(),
+            queue_.SubmitTransfer(digest, whole, caller.client, caller.has(Role::kAdminister)));
         daemon_.writing.events.LogSubmitted(
             Submitted(response->job()).With("transfer_of", request->modal_model()), caller);
         return absl::OkStatus();
@@ -219,11 +221,12 @@ absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
 // Another request for a stored model does not take away a material with which its objects sound.
 bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material,
                                     const Principal& caller) {
+  const absl::Status may_change = CheckMayChange(digest, caller);
+  if (absl::IsPermissionDenied(may_change)) return false;
   const auto known = database_.models().Material(digest);
   if (!known.ok() || !known->has_value()) return true;
   // A request that is repeated does not read the model.
   if ((*known)->SerializeAsString() == material.SerializeAsString()) return true;
-  if (!CheckMayChange(digest, caller).ok()) return false;
   if (!absl::IsFailedPrecondition(CheckMaterial(material, digest))) return true;
   return !CheckMaterial(**known, digest).ok();
 }

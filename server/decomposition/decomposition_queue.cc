@@ -60,14 +60,16 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> DecompositionQueue::Make(
 
 absl::StatusOr<v1::Job> DecompositionQueue::Submit(const v1::CreateModalModelRequest& request,
                                                    const std::string& client,
-                                                   const MaterialCheck& check) {
-  return core_->Submit(request, client, check);
+                                                   const MaterialCheck& check,
+                                                   bool may_change_pinned) {
+  return core_->Submit(request, client, check, may_change_pinned);
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::SubmitTransfer(const std::string& model,
                                                            const v1::CreateTransferRequest& request,
-                                                           const std::string& client) {
-  return core_->SubmitTransfer(model, request, client);
+                                                           const std::string& client,
+                                                           bool may_change_pinned) {
+  return core_->SubmitTransfer(model, request, client, may_change_pinned);
 }
 
 DecompositionQueue::Counts DecompositionQueue::counts() { return core_->counts(); }

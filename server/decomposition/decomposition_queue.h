@@ -73,9 +73,12 @@ class DecompositionQueue {
   /// time-out or a lack of memory is queued again. Errors: those of ResolveRequest, NotFound
   /// (MESH_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED). Clients, named by
   /// `client`, take turns. A job that several clients ask for counts for the first of them. The
-  /// material of the request becomes the model's, unless there is a `check` that says no.
+  /// material of the request becomes the model's, unless there is a `check` that says no. If the
+  /// client may not change pinned models, a request that would change one is refused:
+  /// PermissionDenied (ROLE_MISSING).
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
-                                 const std::string& client = {}, const MaterialCheck& check = {});
+                                 const std::string& client = {}, const MaterialCheck& check = {},
+                                 bool may_change_pinned = true);
 
   /// Requests a transfer of the stored model `model`. The job has succeeded at once if a stored
   /// transfer satisfies the request. In all other respects the call works like Submit. Errors:
@@ -83,7 +86,8 @@ class DecompositionQueue {
   /// (MODAL_MODEL_NOT_FOUND), ResourceExhausted (QUEUE_FULL, CLIENT_LIMIT_REACHED).
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request,
-                                         const std::string& client = {});
+                                         const std::string& client = {},
+                                         bool may_change_pinned = true);
 
   /// The numbers of jobs that wait, that run, and that have ended since the queue was made.
   struct Counts {

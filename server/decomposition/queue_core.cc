@@ -99,10 +99,12 @@ void QueueCore::Stop() {
 
 absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& request,
                                           const std::string& client,
-                                          const DecompositionQueue::MaterialCheck& check) {
+                                          const DecompositionQueue::MaterialCheck& check,
+                                          bool may_change_pinned) {
   ASSIGN_OR_RETURN(const v1::CreateModalModelRequest resolved, ResolveRequest(request));
   WantedJob wanted = WantedModel(resolved);
   wanted.client = client;
+  wanted.may_change_pinned = may_change_pinned;
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
@@ -126,9 +128,11 @@ absl::StatusOr<v1::Job> QueueCore::Submit(const v1::CreateModalModelRequest& req
 
 absl::StatusOr<v1::Job> QueueCore::SubmitTransfer(const std::string& model,
                                                   const v1::CreateTransferRequest& request,
-                                                  const std::string& client) {
+                                                  const std::string& client,
+                                                  bool may_change_pinned) {
   ASSIGN_OR_RETURN(WantedJob wanted, WantedTransfer(model, request));
   wanted.client = client;
+  wanted.may_change_pinned = may_change_pinned;
   Notices notices;
   absl::StatusOr<v1::Job> job;
   {
@@ -151,11 +155,12 @@ void QueueCore::FollowByTransfer(const WantedJob& model, Notices& notices) {
   if (!wanted || !model.transfer_of.empty()) return;
   WantedJob transfer = WantedTransfer(model.digest, model.request);
   transfer.client = model.client;
+  transfer.may_change_pinned = model.may_change_pinned;
   SubmitAny(transfer, notices).status().IgnoreError();
 }
 
 absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& notices) {
-  const auto& [digest, request, transfer_of, client] = wanted;
+  const auto& [digest, request, transfer_of, client, may_change_pinned] = wanted;
   ASSIGN_OR_RETURN(const std::optional<JobRecord> known, database_.jobs().Find(digest));
   ASSIGN_OR_RETURN(const bool satisfied, IsSatisfied(database_, wanted, known));
   if (known.has_value() &&
@@ -164,6 +169,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
     return ToJob(*known);
   }
   if (!satisfied) {
+    RETURN_IF_ERROR(CheckPin(database_.models(), wanted));
     RETURN_IF_ERROR(CheckAcceptable(wanted));
   }
   // The coarse job is stored first. A daemon that takes up this job then finds the coarse one.
@@ -224,6 +230,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active, const Wa
   const bool wanted_no_more = active.record.state == v1::JOB_STATE_CANCELLED || active.deleted;
   const bool farther = WantsMore(request, active.request);
   const bool sooner = request.priority() > active.record.priority;
+  if (wanted_no_more || farther) RETURN_IF_ERROR(CheckPin(database_.models(), wanted));
   RETURN_IF_ERROR(AddWish(active.waits_for, wanted.client));
   if (!wanted_no_more) RETURN_IF_ERROR(AddWish(digest, wanted.client));
   if (!wanted_no_more && !farther && !sooner) return Get(digest);

@@ -49,10 +49,11 @@ class QueueCore {
 
   absl::StatusOr<v1::Job> Submit(const v1::CreateModalModelRequest& request,
                                  const std::string& client,
-                                 const DecompositionQueue::MaterialCheck& check);
+                                 const DecompositionQueue::MaterialCheck& check,
+                                 bool may_change_pinned);
   absl::StatusOr<v1::Job> SubmitTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request,
-                                         const std::string& client);
+                                         const std::string& client, bool may_change_pinned);
   DecompositionQueue::Counts counts();
   absl::StatusOr<v1::Job> Get(const std::string& digest);
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,

@@ -69,6 +69,18 @@ absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted
              : HasTransfer(database, wanted, record);
 }
 
+absl::Status CheckPin(ModelStore& models, const WantedJob& wanted) {
+  if (wanted.may_change_pinned) return absl::OkStatus();
+  const std::string& digest = wanted.transfer_of.empty() ? wanted.digest : wanted.transfer_of;
+  const absl::StatusOr<ModelSummary> model = models.Summary(digest);
+  if (!model.ok() || !model->pinned) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
+                 absl::StrCat("modalModels/", digest,
+                              " is pinned, and this request would change it, which needs the role "
+                              "administer: use the model as it is, or ask the daemon's "
+                              "administrator"));
+}
+
 bool HasCoarseModel(ModelStore& models, const std::string& digest,
                     const v1::CreateModalModelRequest& request) {
   const absl::StatusOr<ModelSummary> model = models.Summary(digest);

@@ -30,6 +30,10 @@ absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
 absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted,
                                  const std::optional<JobRecord>& record);
 
+/// Checks that the client may have the model changed that the job computes, or that its transfer
+/// belongs to. Errors: PermissionDenied (ROLE_MISSING: it is pinned).
+absl::Status CheckPin(ModelStore& models, const WantedJob& wanted);
+
 /// Returns whether the stored model is only the coarse model that the request wants first.
 bool HasCoarseModel(ModelStore& models, const std::string& digest,
                     const v1::CreateModalModelRequest& request);

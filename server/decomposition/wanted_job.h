@@ -15,8 +15,9 @@ struct WantedJob {
   /// The resolved request. The request of a transfer has a material, size, band and limits, but no
   /// mesh.
   v1::CreateModalModelRequest request;
-  std::string transfer_of{};  ///< see JobRecord::transfer_of
-  std::string client{};       ///< the client that asked; see ActiveJob
+  std::string transfer_of{};      ///< see JobRecord::transfer_of
+  std::string client{};           ///< the client that asked; see ActiveJob
+  bool may_change_pinned = true;  ///< whether the client may have a pinned model changed
 };
 
 /// Returns the decomposition that a resolved request asks for.

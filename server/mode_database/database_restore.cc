@@ -44,6 +44,11 @@ absl::Status CopyFiles(const path& from, const path& to) {
     std::error_code error;
     if (!std::filesystem::exists(part, error)) continue;
     std::filesystem::copy_file(part, to.string() + suffix, error);
+    // On a full disk some systems only say that the copy failed.
+    std::error_code ignored;
+    const bool is_full = error && std::filesystem::space(to.parent_path(), ignored).available <
+                                      std::filesystem::file_size(part, ignored);
+    if (is_full) error = std::make_error_code(std::errc::no_space_on_device);
     if (error) return CannotMove(part, error);
   }
   return absl::OkStatus();

@@ -159,5 +159,26 @@ TEST_F(SharedModelsApi, ARequestDoesNotTakeAwayAMaterialWithWhichTheModelSounds)
   EXPECT_EQ(Get(name).material().young_pa(), 1.1 * young_pa);
 }
 
+TEST_F(SharedModelsApi, ARequestDoesNotChangeAPinnedModelOfOthers) {
+  v1::CreateModalModelRequest request = RequestWithMesh();
+  const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
+  ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
+  v1::UpdateModalModelRequest pin;
+  pin.set_name(name);
+  pin.set_pinned(true);
+  v1::UpdateModalModelResponse pinned;
+  ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, pin, pinned).ok());
+  v1::CreateModalModelResponse response;
+  const auto create = &v1::ModalModelService::Stub::CreateModalModel;
+  EXPECT_TRUE(Call(*neighbours_, create, request, response).ok()) << "it has what is asked for";
+  request.set_max_frequency_hz(1e9);
+  for (int i = 0; i < 2; ++i) {
+    ExpectRefused(Call(*neighbours_, create, request, response), grpc::PERMISSION_DENIED,
+                  "ROLE_MISSING");
+  }
+  EXPECT_FALSE(Get(name).has_material());
+  EXPECT_EQ(Get(name).revision(), pinned.modal_model().revision());
+}
+
 }  // namespace
 }  // namespace carillon
