@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -289,6 +290,7 @@ int CheckOnly(const Options& options) {
 
 /// Runs `carillond db check|repair|restore`.
 absl::Status RunDatabaseCommand(const CommandLine& command) {
+  signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
   const std::filesystem::path folder = command.options.data_directory;
   const bool restores = command.database_command == "restore";
   if (!restores && !std::filesystem::exists(folder / DataDirectory::kDatabaseName)) {

@@ -21,10 +21,10 @@ from daemon import BIN, Daemon
 import grpc
 
 
-def allow_small_files_only(limit=8192):
-    """As on a full disk: a write beyond `limit` bytes fails, and does not end the program."""
+def allow_small_files_only():
+    """As on a full disk: a write beyond 8 KiB fails, and does not end the program."""
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
 
 
 class DatabaseCommandsTest(unittest.TestCase):
@@ -253,7 +253,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         names = sorted(path.name for path in data.iterdir())
         limit = (data / "carillon.db").stat().st_size // 2
         for command in (("restore", backup), ("repair",)):
-            failed = self.offline(*command, before=lambda: allow_small_files_only(limit))
+            failed = self.offline(*command, before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
             self.assertEqual((failed.returncode, failed.stdout), (1, ""), command)
             self.assertRegex(failed.stderr, "DATABASE_(FULL|IO_ERROR|UNUSABLE): ")
             self.assertEqual(self.offline("check").stdout.splitlines(), ["models: 1, meshes: 0, jobs: 0", "0 faults"])

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
@@ -64,6 +65,22 @@ bool IsOpenFile(const fs::path& path) {
   return absl::StartsWith(folder, "/proc/") && absl::EndsWith(folder, "/fd");
 }
 
+/// Returns the descriptor of the open file of this process to which the path leads, or -1 if there
+/// is none.
+int OpenDescriptorOf(fs::path path) {
+  std::error_code ignored;
+  const std::string own = absl::StrCat("/proc/", getpid(), "/fd");
+  for (int left = 40; left > 0 && fs::is_symlink(path, ignored); --left) {
+    int descriptor = -1;
+    if (fs::canonical(path.parent_path(), ignored) == own) {
+      return absl::SimpleAtoi(path.filename().string(), &descriptor) ? descriptor : -1;
+    }
+    const fs::path target = fs::read_symlink(path, ignored);
+    path = path.parent_path() / target;
+  }
+  return -1;
+}
+
 /// Returns the path with the file to which it leads, without symbolic links, or an empty path if
 /// the bytes go to that file at once, because it is a device or a pipe, or a process has it open.
 /// The file need not exist.
@@ -101,7 +118,14 @@ absl::StatusOr<WholeFile> WholeFile::Create(const std::string& path) {
     RETURN_IF_ERROR(file.OpenBeside());
     return file;
   }
-  file.descriptor_ = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (const int opened = OpenDescriptorOf(path); opened >= 0) {
+    // Opened anew, the file would lose what it has.
+    const fs::path target = fs::read_symlink(absl::StrCat("/proc/self/fd/", opened), ignored);
+    RETURN_IF_ERROR(CheckIsNoDatabase(path, target.string()));
+    file.descriptor_ = fcntl(opened, F_DUPFD_CLOEXEC, 0);
+  } else {
+    file.descriptor_ = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  }
   if (file.descriptor_ < 0) return file.Failed(errno);
   return file;
 }

@@ -108,15 +108,19 @@ TEST_F(WholeFileTest, LeavesAFileInMemoryAsItIsUnlessItIsPublished) {
 }
 
 TEST_F(WholeFileTest, WritesAtOnceIntoAFileThatIsOpen) {
-  Put(file_, "");
-  const int descriptor = open(file_.c_str(), O_WRONLY | O_CLOEXEC);
+  Put(file_, "header");
+  const int descriptor = open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  std::string expected = "header";
   fs::create_symlink(absl::StrCat("/dev/fd/", descriptor), folder_ / "link");
   for (const fs::path& path : {fs::path(absl::StrCat("/dev/fd/", descriptor)), folder_ / "link"}) {
     absl::StatusOr<WholeFile> file = WholeFile::Create(path);
     ASSERT_TRUE(file.ok()) << file.status();
     ASSERT_TRUE(file->Write("a copy").ok());
-    EXPECT_EQ(TextOf(file_), "a copy");
+    EXPECT_EQ(TextOf(file_), expected += "a copy");
   }
+  Put(file_.string() + "-wal", "live");
+  EXPECT_THAT(Refused(folder_ / "link"), HasSubstr("OUTPUT_IN_USE: "));
+  EXPECT_EQ(TextOf(file_), expected);
   close(descriptor);
 }
 
