@@ -261,7 +261,13 @@ absl::Status Check(const std::filesystem::path& file, const OnFinding& on_findin
 
 /// Prints what the database has now, and where the old one is.
 absl::Status Report(const std::filesystem::path& file, const std::filesystem::path& kept) {
-  if (!kept.empty()) std::cout << "the old database is kept as " << kept.string() << std::endl;
+  std::error_code ignored;
+  if (std::filesystem::exists(kept, ignored)) {
+    std::cout << "the old database is kept as " << kept.string() << std::endl;
+  } else if (!kept.empty()) {
+    std::cout << "what was left of the old database is kept as " << kept.string()
+              << "-wal or -count" << std::endl;
+  }
   return PrintContents(file);
 }
 
@@ -293,7 +299,10 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
   signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
   const std::filesystem::path folder = command.options.data_directory;
   const bool restores = command.database_command == "restore";
-  if (!restores && !std::filesystem::exists(folder / DataDirectory::kDatabaseName)) {
+  std::error_code ignored;
+  const std::filesystem::file_status database =
+      std::filesystem::symlink_status(folder / DataDirectory::kDatabaseName, ignored);
+  if (!restores && !std::filesystem::exists(database)) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat("there is no database ", DataDirectory::kDatabaseName, " in ",
                                 folder.string(), ": name its folder with --data-dir"));

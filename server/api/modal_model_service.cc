@@ -15,6 +15,7 @@
 #include "server/api/object_conversion.h"
 #include "server/api/resource_name.h"
 #include "server/api/unary_call.h"
+#include "server/decomposition/stored_model.h"
 #include "server/scene/sounding_object.h"
 
 namespace carillon {
@@ -221,8 +222,7 @@ absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
 // Another request for a stored model does not take away a material with which its objects sound.
 bool ModalModelService::MayRemember(const std::string& digest, const v1::Material& material,
                                     const Principal& caller) {
-  const absl::Status may_change = CheckMayChange(digest, caller);
-  if (absl::IsPermissionDenied(may_change)) return false;
+  if (!CheckPin(database_.models(), digest, caller.has(Role::kAdminister)).ok()) return false;
   const auto known = database_.models().Material(digest);
   if (!known.ok() || !known->has_value()) return true;
   // A request that is repeated does not read the model.
@@ -231,23 +231,11 @@ bool ModalModelService::MayRemember(const std::string& digest, const v1::Materia
   return !CheckMaterial(**known, digest).ok();
 }
 
-// A pin protects a model from everybody but administrators: without it a caller could have the
-// model deleted, by imports that exceed the budget.
-absl::Status ModalModelService::CheckMayChange(const std::string& digest, const Principal& caller) {
-  if (caller.has(Role::kAdminister)) return absl::OkStatus();
-  ASSIGN_OR_RETURN(const ModelSummary model, database_.models().Summary(digest));
-  if (!model.pinned) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
-                 absl::StrCat(ModelName(digest), " is pinned, and ", caller.name,
-                              " has not the role administer, which a change of it needs: ask the "
-                              "daemon's administrator to change it"));
-}
-
 absl::Status ModalModelService::Update(const v1::UpdateModalModelRequest& request,
                                        const Principal& caller,
                                        v1::UpdateModalModelResponse& response) {
   ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request.name()));
-  RETURN_IF_ERROR(CheckMayChange(digest, caller));
+  RETURN_IF_ERROR(CheckPin(database_.models(), digest, caller.has(Role::kAdminister)));
   ModelChange change{.add_tags = {request.add_tags().begin(), request.add_tags().end()},
                      .remove_tags = {request.remove_tags().begin(), request.remove_tags().end()}};
   if (request.has_label()) change.label = request.label();

@@ -67,7 +67,6 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
   absl::Status CheckMaterial(const v1::Material& material, const std::string& digest);
   bool MayRemember(const std::string& digest, const v1::Material& material,
                    const Principal& caller);
-  absl::Status CheckMayChange(const std::string& digest, const Principal& caller);
   absl::Status Update(const v1::UpdateModalModelRequest& request, const Principal& caller,
                       v1::UpdateModalModelResponse& response);
   absl::Status List(const v1::ListModalModelsRequest& request,

@@ -177,7 +177,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitNew(const WantedJob& wanted, Notices& n
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
   if (satisfied) record.state = v1::JOB_STATE_SUCCEEDED;
   if (known.has_value()) record.peak_bytes = known->peak_bytes;
-  RETURN_IF_ERROR(database_.jobs().Put(record, JobWishes({client}).Wanting()));
+  RETURN_IF_ERROR(database_.jobs().Put(record, {client}));
   if (satisfied) {
     const v1::Job ended = ToJob(record);
     jobs_.TellEnded(ended);
@@ -238,7 +238,7 @@ absl::StatusOr<v1::Job> QueueCore::SubmitAgain(const ActiveJob& active, const Wa
   record.state = v1::JOB_STATE_QUEUED;
   record.priority = std::max(record.priority, request.priority());
   if (wanted_no_more || farther) record.request = request.SerializeAsString();
-  RETURN_IF_ERROR(database_.jobs().Put(record, JobWishes({wanted.client}).Wanting()));
+  RETURN_IF_ERROR(database_.jobs().Put(record, {wanted.client}));
   return jobs_
       .Change(digest,
               [&](ActiveJob& job) {

@@ -69,9 +69,8 @@ absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted
              : HasTransfer(database, wanted, record);
 }
 
-absl::Status CheckPin(ModelStore& models, const WantedJob& wanted) {
-  if (wanted.may_change_pinned) return absl::OkStatus();
-  const std::string& digest = wanted.transfer_of.empty() ? wanted.digest : wanted.transfer_of;
+absl::Status CheckPin(ModelStore& models, const std::string& digest, bool may_change_pinned) {
+  if (may_change_pinned) return absl::OkStatus();
   const absl::StatusOr<ModelSummary> model = models.Summary(digest);
   if (!model.ok() || !model->pinned) return absl::OkStatus();
   return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
@@ -79,6 +78,11 @@ absl::Status CheckPin(ModelStore& models, const WantedJob& wanted) {
                               " is pinned, and this request would change it, which needs the role "
                               "administer: use the model as it is, or ask the daemon's "
                               "administrator"));
+}
+
+absl::Status CheckPin(ModelStore& models, const WantedJob& wanted) {
+  const std::string& digest = wanted.transfer_of.empty() ? wanted.digest : wanted.transfer_of;
+  return CheckPin(models, digest, wanted.may_change_pinned);
 }
 
 bool HasCoarseModel(ModelStore& models, const std::string& digest,

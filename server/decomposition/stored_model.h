@@ -30,8 +30,12 @@ absl::StatusOr<bool> IsSatisfied(ModelStore& models, const std::string& digest,
 absl::StatusOr<bool> IsSatisfied(ModeDatabase& database, const WantedJob& wanted,
                                  const std::optional<JobRecord>& record);
 
-/// Checks that the client may have the model changed that the job computes, or that its transfer
-/// belongs to. Errors: PermissionDenied (ROLE_MISSING: it is pinned).
+/// Checks that a caller may change a model: the model is not pinned, or `may_change_pinned`. A pin
+/// protects a model from everybody but administrators, because others could otherwise have the
+/// model deleted, by imports that exceed the budget. Errors: PermissionDenied (ROLE_MISSING).
+absl::Status CheckPin(ModelStore& models, const std::string& digest, bool may_change_pinned);
+
+/// Does the same for the model that a job computes, or to which its transfer belongs.
 absl::Status CheckPin(ModelStore& models, const WantedJob& wanted);
 
 /// Returns whether the stored model is only the coarse model that the request wants first.

@@ -115,12 +115,12 @@ absl::Status InTransaction(SqliteConnection& connection, const char* begin,
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::path& file) {
-  const std::filesystem::path absolute = std::filesystem::absolute(file);
   std::error_code error;
-  std::filesystem::create_directories(absolute.parent_path(), error);
-  if (error) return Unusable(absolute, error.message());
-  RETURN_IF_ERROR(CompleteReplacement(absolute));
-  std::unique_ptr<Database> database(new Database(absolute));
+  std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
+  if (error) return Unusable(file, error.message());
+  ASSIGN_OR_RETURN(const std::filesystem::path real, FollowLinks(file));
+  RETURN_IF_ERROR(CompleteReplacement(real));
+  std::unique_ptr<Database> database(new Database(real));
   RETURN_IF_ERROR(database->ConnectWriter());
   RETURN_IF_ERROR(database->ReadChangeCount());
   return database;
@@ -155,7 +155,7 @@ std::string Database::MissingChanges() const {
   return absl::StrCat(
       missing_change_count_, " changes that were acknowledged are missing in ", file_.string(),
       ": somebody removed its -wal file, or put an older file in its place; put the "
-      "right files back, or run carillond db restore");
+      "right files back, or restore a backup");
 }
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
@@ -237,6 +237,14 @@ absl::Status Database::TryAgain() {
     return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('tried_again', '')");
   }).IgnoreError();
   return CheckState();
+}
+
+void Database::CopyLog() {
+  MutexLock lock(&writer_mutex_);
+  const auto copy = [&writer = *writer_] {
+    return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
+  };
+  files_.Change(copy).IgnoreError();
 }
 
 absl::Status Database::Tidy() {

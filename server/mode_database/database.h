@@ -44,6 +44,9 @@ class Database {
   /// whether the database can be changed again.
   absl::Status TryAgain();
 
+  /// Copies the log into the file, as far as no reader needs it. An error shows at the next change.
+  void CopyLog();
+
   /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
   /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
   absl::Status Tidy();

@@ -5,7 +5,10 @@
 #include <string_view>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
@@ -66,7 +69,11 @@ absl::Status CountPages(SqliteConnection& connection, DatabaseStats& stats) {
 absl::Status CheckStructure(Database& database, const OnFinding& on_finding) {
   return database.Read([&](SqliteConnection& connection) {
     return connection.Query("PRAGMA integrity_check", {}, [&](const SqlRow& row) {
-      if (row.Text(0) != "ok") on_finding(absl::StrCat("structure: ", row.Text(0)));
+      // The first row begins with a line that names the database, and has one line for each page.
+      for (const absl::string_view line : absl::StrSplit(row.Text(0), '\n')) {
+        if (line == "ok" || absl::StartsWith(line, "***")) continue;
+        on_finding(absl::StrCat("structure: ", line));
+      }
       return absl::OkStatus();
     });
   });

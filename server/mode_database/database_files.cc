@@ -28,7 +28,7 @@ constexpr uintmax_t kMostReserveBytes = 16 << 20;
 constexpr uintmax_t kLeastReserveBytes = 1 << 20;
 /// The reserve takes at most a fourth of the free space.
 constexpr uintmax_t kReservePart = 4;
-constexpr char kBackupSuffix[] = "-backup-";
+constexpr char kUnfinishedSuffix[] = "-unfinished-";
 
 std::filesystem::path LogOf(const std::filesystem::path& file) { return file.string() + "-wal"; }
 
@@ -36,12 +36,17 @@ std::filesystem::path CountOf(const std::filesystem::path& file) {
   return file.string() + "-count";
 }
 
+absl::Status IsNoFile(const std::filesystem::path& file, absl::string_view why) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                 absl::StrCat("the database ", file.string(), " cannot be opened: ", why));
+}
+
 }  // namespace
 
 bool DatabaseFiles::IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                            WrittenFile& size) {
+                            WrittenFile& written) {
   bool is_same = false;
-  const bool has_all = size.IsWhole([&]() -> int64_t {
+  const bool has_all = written.IsWhole([&]() -> int64_t {
     struct stat status {};
     const bool exists = stat(file.c_str(), &status) == 0;
     if (exists && !seen) seen = Seen{.device = status.st_dev, .inode = status.st_ino};
@@ -53,14 +58,14 @@ bool DatabaseFiles::IsWhole(const std::filesystem::path& file, std::optional<See
 
 absl::Status DatabaseFiles::Check() {
   const MutexLock lock(&mutex_);
-  const bool has_database = IsWhole(file_, database_, sizes_.database());
-  const bool has_log = IsWhole(LogOf(file_), log_, sizes_.log());
+  const bool has_database = IsWhole(file_, database_, writes_.database());
+  const bool has_log = IsWhole(LogOf(file_), log_, writes_.log());
   const bool was_lost = std::exchange(lost_, lost_ || !has_database || !has_log);
   if (!lost_) return absl::OkStatus();
   if (!was_lost) LossMark(file_).Set();
   // The stop would copy a damaged log into the file.
-  sizes_.database().Close();
-  sizes_.log().Close();
+  writes_.database().Close();
+  writes_.log().Close();
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
                  absl::StrCat("somebody removed, replaced, truncated or overwrote ", file_.string(),
                               " or its -wal file while the daemon ran, so that nothing can be "
@@ -136,13 +141,39 @@ void DiskReserve::Release() const {
   std::filesystem::remove(file_, ignored);
 }
 
-std::filesystem::path NewBackupFile(const std::filesystem::path& file) {
-  static std::atomic<int> count = 0;
-  return absl::StrCat(file.string(), kBackupSuffix, ++count);
+absl::StatusOr<std::filesystem::path> FollowLinks(const std::filesystem::path& file) {
+  using std::filesystem::file_type;
+  std::error_code error;
+  const std::filesystem::path absolute = std::filesystem::absolute(file, error);
+  const bool is_link =
+      std::filesystem::symlink_status(absolute, error).type() == file_type::symlink;
+  const file_type type = std::filesystem::status(absolute, error).type();
+  if (type != file_type::regular && is_link) {
+    return IsNoFile(file,
+                    "it is a symbolic link that leads to no file; mount the disk to which it "
+                    "leads, or remove the link");
+  }
+  if (type != file_type::regular && type != file_type::not_found) {
+    return IsNoFile(file, type == file_type::directory
+                              ? "it is a folder; move it away"
+                              : "it is not a file, or this user may not see it");
+  }
+  std::filesystem::path real = std::filesystem::weakly_canonical(absolute, error);
+  if (error) return IsNoFile(file, error.message());
+  return real;
 }
 
-void RemoveUnfinishedBackups(const std::filesystem::path& file) {
-  const std::string prefix = file.filename().string() + kBackupSuffix;
+std::filesystem::path UnfinishedCopy(const std::filesystem::path& file, const std::string& kind) {
+  return absl::StrCat(file.string(), kUnfinishedSuffix, kind);
+}
+
+std::filesystem::path NewBackupFile(const std::filesystem::path& file) {
+  static std::atomic<int> count = 0;
+  return UnfinishedCopy(file, absl::StrCat("backup-", ++count));
+}
+
+void RemoveUnfinishedCopies(const std::filesystem::path& file) {
+  const std::string prefix = file.filename().string() + kUnfinishedSuffix;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), error)) {
     if (!absl::StartsWith(entry.path().filename().string(), prefix)) continue;

@@ -11,6 +11,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/mode_database/write_watch.h"
 
@@ -24,7 +25,7 @@ class DatabaseFiles {
 
   /// Name of the VFS through which the connection that writes must be opened, and which tells this
   /// object what SQLite has written to the files. That connection must be closed first.
-  const std::string& vfs_name() const { return sizes_.vfs_name(); }
+  const std::string& vfs_name() const { return writes_.vfs_name(); }
 
   /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
   /// or is smaller than SQLite has made it, or a write has found that its first bytes are not
@@ -38,7 +39,9 @@ class DatabaseFiles {
   absl::Status Change(absl::FunctionRef<absl::Status()> work);
 
   /// Returns the size of both files.
-  int64_t byte_count() const { return sizes_.database().byte_count() + sizes_.log().byte_count(); }
+  int64_t byte_count() const {
+    return writes_.database().byte_count() + writes_.log().byte_count();
+  }
 
  private:
   struct Seen {
@@ -46,10 +49,10 @@ class DatabaseFiles {
     ino_t inode = 0;
   };
   static bool IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                      WrittenFile& size);
+                      WrittenFile& written);
 
   const std::filesystem::path file_;
-  WriteWatch sizes_;
+  WriteWatch writes_;
   Mutex mutex_;
   std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
   std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
@@ -114,10 +117,19 @@ class DiskReserve {
   const std::filesystem::path file_;
 };
 
-/// Returns a new file name in the database's folder for a backup in progress.
+/// Returns the file to which a database's name leads, because SQLite keeps the log beside that
+/// file. It need not exist. Errors: FailedPrecondition (DATABASE_UNUSABLE: the name is that of a
+/// folder or a device, or of a symbolic link that leads to no file).
+absl::StatusOr<std::filesystem::path> FollowLinks(const std::filesystem::path& file);
+
+/// Returns a name beside the database for a copy in progress. `kind` says what makes the copy, such
+/// as `restore`.
+std::filesystem::path UnfinishedCopy(const std::filesystem::path& file, const std::string& kind);
+
+/// Returns a new name for a backup in progress.
 std::filesystem::path NewBackupFile(const std::filesystem::path& file);
 
-/// Removes the unfinished backups that a killed process has left.
-void RemoveUnfinishedBackups(const std::filesystem::path& file);
+/// Removes the unfinished copies that a killed process has left.
+void RemoveUnfinishedCopies(const std::filesystem::path& file);
 
 }  // namespace carillon

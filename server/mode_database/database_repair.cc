@@ -18,6 +18,7 @@
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_contents.h"
+#include "server/mode_database/database_files.h"
 #include "server/mode_database/database_replacement.h"
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/mesh_store.h"
@@ -147,11 +148,12 @@ absl::Status CopyToFresh(const std::filesystem::path& file, const std::filesyste
 
 }  // namespace
 
-absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& file,
+absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& named,
                                                      const OnFinding& on_finding) {
+  ASSIGN_OR_RETURN(const std::filesystem::path file, FollowLinks(named));
   RETURN_IF_ERROR(CompleteReplacement(file));
-  const std::filesystem::path fresh = file.string() + ".repaired";
-  RemoveDatabase(fresh);
+  RemoveUnfinishedCopies(file);
+  const std::filesystem::path fresh = UnfinishedCopy(file, "repair");
   RETURN_IF_ERROR(ExtendCutFile(file));
   if (absl::Status copied = CopyToFresh(file, fresh, on_finding); !copied.ok()) {
     RemoveDatabase(fresh);

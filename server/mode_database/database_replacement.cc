@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <fstream>
 #include <string>
@@ -29,8 +28,10 @@ path MarkerOf(const path& file) { return file.string() + "-replacement"; }
 
 /// Whether a database or a part of it has this name.
 bool IsTaken(const path& name) {
-  return absl::c_any_of(std::array{"", "-wal", "-count"}, [&](const char* suffix) {
-    return std::filesystem::exists(std::filesystem::symlink_status(name.string() + suffix));
+  return absl::c_any_of(kContentSuffixes, [&](const char* suffix) {
+    std::error_code ignored;
+    return std::filesystem::exists(
+        std::filesystem::symlink_status(name.string() + suffix, ignored));
   });
 }
 
@@ -39,8 +40,9 @@ bool IsTaken(const path& name) {
 absl::Status CheckIsWhole(const path& file) {
   std::error_code error;
   const uintmax_t left = std::filesystem::file_size(file.string() + "-wal", error);
-  if (!error && left > 0)
+  if (!error && left > 0) {
     return CannotMove(file, std::make_error_code(std::errc::no_space_on_device));
+  }
   return SqliteConnection::CheckStructure(file, [] { return true; });
 }
 
@@ -61,12 +63,17 @@ absl::Status Rename(const path& from, const path& to) {
 /// Gives a file a second name. Copies the file where the file system has no hard links.
 absl::Status Link(const path& from, const path& to) {
   std::error_code error;
-  if (std::filesystem::exists(to) || !std::filesystem::exists(from)) return absl::OkStatus();
+  if (std::filesystem::exists(to, error) || !std::filesystem::exists(from, error)) {
+    return absl::OkStatus();
+  }
   std::filesystem::create_hard_link(from, to, error);
   if (!error) return absl::OkStatus();
   const path part = to.string() + ".part";
   std::filesystem::copy_file(from, part, std::filesystem::copy_options::overwrite_existing, error);
-  return error ? CannotMove(from, error) : Rename(part, to);
+  if (!error) return Rename(part, to);
+  std::error_code ignored;
+  std::filesystem::remove(part, ignored);
+  return CannotMove(from, error);
 }
 
 /// Returns the first name for a kept database that nothing has.
@@ -87,6 +94,19 @@ absl::Status WriteMarker(const path& file, const path& fresh, const path& kept) 
   RETURN_IF_ERROR(Sync(part));
   RETURN_IF_ERROR(Rename(part, MarkerOf(file)));
   return Sync(file.parent_path());
+}
+
+/// Undoes what a replacement that cannot be completed has done before the new database took the
+/// place of `file`.
+void Undo(const path& file, const path& fresh, const path& kept) {
+  if (!Link(kept.string() + "-wal", file.string() + "-wal").ok()) return;
+  std::error_code ignored;
+  const path marker = MarkerOf(file);
+  for (const path& left : {marker, path(marker.string() + ".part")}) {
+    std::filesystem::remove(left, ignored);
+  }
+  RemoveDatabase(kept);
+  RemoveDatabase(fresh);
 }
 
 absl::Status Begin(const path& file, const path& fresh, const path& kept) {
@@ -126,18 +146,20 @@ absl::Status CompleteReplacement(const path& file) {
   const path kept = file.parent_path() / kept_name;
   std::error_code ignored;
   // Each step may have been done before.
-  if (std::filesystem::exists(fresh)) {
-    for (const char* suffix : {"-wal", "-count", ""}) {
+  if (std::filesystem::exists(fresh, ignored)) {
+    for (const char* suffix : kContentSuffixes) {
       RETURN_IF_ERROR(Link(file.string() + suffix, kept.string() + suffix));
     }
     // The log of the old database must not be applied to the new one.
-    for (const char* suffix : {"-wal", "-shm"}) {
-      std::filesystem::remove(file.string() + suffix, ignored);
-    }
+    const path log = file.string() + "-wal";
+    std::error_code error;
+    std::filesystem::remove(log, error);
+    if (error) return CannotMove(log, error);
+    std::filesystem::remove(file.string() + "-shm", ignored);
     RETURN_IF_ERROR(Rename(fresh, file));
   }
   const path fresh_count = fresh.string() + "-count";
-  if (std::filesystem::exists(fresh_count)) {
+  if (std::filesystem::exists(fresh_count, ignored)) {
     RETURN_IF_ERROR(Rename(fresh_count, file.string() + "-count"));
   }
   RETURN_IF_ERROR(Sync(file.parent_path()));
@@ -147,20 +169,14 @@ absl::Status CompleteReplacement(const path& file) {
 }
 
 absl::StatusOr<path> ReplaceDatabase(const path& file, const path& fresh, const std::string& kind) {
-  const path absolute = std::filesystem::absolute(file);
-  const bool existed = IsTaken(absolute);
-  const path kept = NewName(absolute, kind);
-  if (absl::Status begun = Begin(absolute, fresh, kept); !begun.ok()) {
-    std::error_code ignored;
-    const path marker = MarkerOf(absolute);
-    for (const path& left : {marker, path(marker.string() + ".part")}) {
-      std::filesystem::remove(left, ignored);
-    }
-    RemoveDatabase(fresh);
-    return begun;
-  }
-  RETURN_IF_ERROR(CompleteReplacement(absolute));
-  return existed ? kept : path();
+  const bool existed = IsTaken(file);
+  const path kept = NewName(file, kind);
+  absl::Status status = Begin(file, fresh, kept);
+  if (status.ok()) status = CompleteReplacement(file);
+  if (status.ok()) return existed ? kept : path();
+  std::error_code ignored;
+  if (std::filesystem::exists(fresh, ignored)) Undo(file, fresh, kept);
+  return status;
 }
 
 }  // namespace carillon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <system_error>
@@ -13,11 +14,16 @@ namespace carillon {
 /// Puts a checked database in the place of another. A program that is killed at any moment leaves
 /// either the old database or the new one, and loses neither.
 
+/// Suffixes of the files that have a database's content: its log, its count of changes, and the
+/// database itself.
+inline constexpr std::array kContentSuffixes = {"-wal", "-count", ""};
+
 /// Replaces the database `file` by `fresh`, which no program has open, after a check of its
 /// structure. Keeps the old database with its log as `file`.KIND, or as `file`.KIND-2 and so on if
 /// a file with that name exists. Returns the name of the kept database, or an empty path if there
-/// was none. If the replacement cannot begin, `fresh` is removed. Errors: FailedPrecondition
-/// (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL), DataLoss (DATABASE_CORRUPT).
+/// was none. `file` is absolute and no symbolic link. Errors: FailedPrecondition
+/// (DATABASE_UNUSABLE), ResourceExhausted (DATABASE_FULL), DataLoss (DATABASE_CORRUPT); `file` then
+/// stays as it was, and `fresh` is removed.
 absl::StatusOr<std::filesystem::path> ReplaceDatabase(const std::filesystem::path& file,
                                                       const std::filesystem::path& fresh,
                                                       const std::string& kind);

@@ -5,9 +5,11 @@
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/mode_database/database_admin.h"
+#include "server/mode_database/database_files.h"
 #include "server/mode_database/database_replacement.h"
 #include "server/mode_database/sqlite_connection.h"
 
@@ -21,14 +23,14 @@ absl::Status Corrupt(const path& copy, absl::string_view why) {
 }
 
 /// Checks that the copy may take the place of `file`.
-absl::Status CheckIsAnother(const path& file, const path& copy, const path& incoming) {
+absl::Status CheckIsAnother(const path& file, const path& copy) {
   std::error_code ignored;
   if (!std::filesystem::exists(copy, ignored)) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat("there is no file ", copy.string(),
                                 ", or this user may not see it: name a backup"));
   }
-  for (const path& own : {file, incoming}) {
+  for (const path& own : {file, UnfinishedCopy(file, "restore"), UnfinishedCopy(file, "repair")}) {
     if (!std::filesystem::equivalent(copy, own, ignored)) continue;
     return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
                    absl::StrCat(copy.string(), " is ", own.string(),
@@ -39,16 +41,18 @@ absl::Status CheckIsAnother(const path& file, const path& copy, const path& inco
 
 /// Copies a database with its write-ahead log, which has its newest changes, and the count of them.
 absl::Status CopyFiles(const path& from, const path& to) {
-  for (const char* suffix : {"", "-wal", "-count"}) {
+  for (const char* suffix : kContentSuffixes) {
     const path part = from.string() + suffix;
     std::error_code error;
     if (!std::filesystem::exists(part, error)) continue;
     std::filesystem::copy_file(part, to.string() + suffix, error);
-    // On a full disk some systems only say that the copy failed.
+    // The library reports a disk that becomes full amid a copy as an error of the disk.
     std::error_code ignored;
-    const bool is_full = error && std::filesystem::space(to.parent_path(), ignored).available <
-                                      std::filesystem::file_size(part, ignored);
-    if (is_full) error = std::make_error_code(std::errc::no_space_on_device);
+    if (error == std::errc::io_error &&
+        std::filesystem::space(to.parent_path(), ignored).available <
+            std::filesystem::file_size(part, ignored)) {
+      error = std::make_error_code(std::errc::no_space_on_device);
+    }
     if (error) return CannotMove(part, error);
   }
   return absl::OkStatus();
@@ -79,19 +83,25 @@ absl::Status CheckCopy(const path& file, const path& copy) {
     if (first_finding.empty()) first_finding = line;
   }));
   if (first_finding.empty()) return absl::OkStatus();
-  return Corrupt(copy, absl::StrCat(" is damaged (", first_finding,
-                                    "): take an older copy, or repair this one first"));
+  return Corrupt(copy,
+                 absl::StrCat(" is damaged (",
+                              absl::StrReplaceAll(first_finding, {{file.string(), copy.string()}}),
+                              "): take an older copy, or repair this one first"));
 }
 
 }  // namespace
 
-absl::StatusOr<path> RestoreDatabase(const path& file, const path& copy) {
+absl::StatusOr<path> RestoreDatabase(const path& named, const path& named_copy) {
+  ASSIGN_OR_RETURN(const path file, FollowLinks(named));
   RETURN_IF_ERROR(CompleteReplacement(file));
-  const path incoming = file.string() + ".incoming";
-  RETURN_IF_ERROR(CheckIsAnother(file, copy, incoming));
-  RemoveDatabase(incoming);
   std::error_code error;
-  std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
+  // The copy's log is beside the file to which a link leads.
+  path copy = std::filesystem::weakly_canonical(named_copy, error);
+  if (error) copy = named_copy;
+  RETURN_IF_ERROR(CheckIsAnother(file, copy));
+  RemoveUnfinishedCopies(file);
+  std::filesystem::create_directories(file.parent_path(), error);
+  const path incoming = UnfinishedCopy(file, "restore");
   absl::Status status = CopyFiles(copy, incoming);
   if (status.ok()) status = CheckCopy(incoming, copy);
   if (status.ok()) return ReplaceDatabase(file, incoming, "replaced");

@@ -108,6 +108,7 @@ absl::Status JobStore::Put(const JobRecord& job, const std::vector<std::string>&
     RETURN_IF_ERROR(PutRow(connection, job));
     if (has_ended) return connection.Run(kForgetClients, {job.digest});
     for (const std::string& client : clients) {
+      if (client.empty()) continue;
       RETURN_IF_ERROR(connection.Run(kAddClient, {client, job.digest}));
     }
     return absl::OkStatus();

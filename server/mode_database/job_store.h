@@ -53,7 +53,8 @@ class JobStore {
   explicit JobStore(Database& database) : database_(&database) {}
 
   /// Writes a job durably, and replaces a job with the same digest. Adds `clients` to those that
-  /// want it. All clients of a job that has ended are forgotten.
+  /// want it; a client without a name is not noted. All clients of a job that has ended are
+  /// forgotten.
   absl::Status Put(const JobRecord& job, const std::vector<std::string>& clients = {});
 
   /// Notes durably that a client wants a job. It is no error if there is no such job.

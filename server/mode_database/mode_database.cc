@@ -14,7 +14,8 @@ absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::file
                                                                  const Clock& clock) {
   ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(file));
   RETURN_IF_ERROR(CheckAfterLoss(*database));
-  RemoveUnfinishedBackups(database->file());
+  database->CopyLog();
+  RemoveUnfinishedCopies(database->file());
   return std::unique_ptr<ModeDatabase>(new ModeDatabase(std::move(database), clock));
 }
 

@@ -21,7 +21,7 @@ std::string NewName() {
 }
 
 /// The log's index, which all processes that use SQLite on the database share in memory. Whoever
-/// changes the log or copies it into the database holds a lock meanwhile, and changes the header.
+/// changes the log, or copies it into the database, holds a lock meanwhile and changes the header.
 class LogIndex {
  public:
   LogIndex(MappingGuard& guard, WrittenFile& database, WrittenFile& log)
@@ -30,43 +30,74 @@ class LogIndex {
   /// Notes that SQLite has mapped a piece of the index into memory.
   void Map(int region, volatile void* mapped, int size) {
     guard_.Guard(mapped, static_cast<size_t>(size));
-    if (region == 0) header_ = static_cast<volatile char*>(mapped);
+    if (region == 0 && size >= kHeaderBytes) header_ = static_cast<volatile char*>(mapped);
   }
 
   void Unmap() {
     guard_.Release();
     header_ = nullptr;
-    seen_.clear();
+    seen_log_.clear();
+    seen_copies_.clear();
   }
 
-  /// Compares the header, after this process has got the lock, with that of its last Leave.
-  void Enter() {
-    if (seen_.empty() || header_ == nullptr || Header() == seen_) return;
-    database_.ForgetHead();
-    log_.ForgetHead();
+  /// Compares the header, after this process has got a lock of writers, with that of its last
+  /// Leave, and returns whether the database `file` has the first bytes that SQLite wrote.
+  bool Enter(sqlite3_file& file) {
+    if (header_ == nullptr) return true;
+    if (Log() != seen_log_) log_.ForgetHead();
+    if (Copies() != seen_copies_ || IsBeingCopied()) database_.ForgetHead();
+    return database_.HasHead(file, [this] { return Copies() == seen_copies_ && !IsBeingCopied(); });
   }
 
-  /// Remembers the header, before this process gives back the lock.
-  void Leave() {
-    if (header_ != nullptr) seen_ = Header();
+  /// Remembers the header, before this process gives back the lock of changes to the log.
+  void LeaveLog(sqlite3_file& file) {
+    if (header_ == nullptr) return;
+    seen_log_ = Log();
+    // Another process may have copied the log meanwhile.
+    if (Copies() != seen_copies_) database_.TakeHead(file);
+    seen_copies_ = Copies();
+  }
+
+  /// Remembers the header, before this process gives back the lock of copies into the database.
+  void LeaveCopies() {
+    if (header_ != nullptr) seen_copies_ = Copies();
   }
 
  private:
-  std::string Header() const {
-    std::string header(kHeaderBytes, '\0');
-    std::copy(header_, header_ + kHeaderBytes, header.begin());
-    return header;
+  std::string Bytes(int begin, int end) const {
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    std::string bytes(end - begin, '\0');
+    std::copy(header_ + begin, header_ + end, bytes.begin());
+    return bytes;
   }
 
-  // https://www.sqlite.org/walformat.html#the_wal_index_file_format: two copies of the header, and
-  // the number of frames that were copied into the database.
-  static constexpr int kHeaderBytes = 100;
+  // https://www.sqlite.org/walformat.html#the_wal_index_file_format: two copies of a header that
+  // changes with every change of the log.
+  std::string Log() const { return Bytes(0, 96); }
+
+  /// The number of frames that were copied into the database, and of those that somebody has begun
+  /// to copy.
+  std::string Copied() const { return Bytes(96, 100); }
+  std::string BegunToCopy() const { return Bytes(128, kHeaderBytes); }
+
+  /// Bytes that change with every copy of the log into the database. A log that is begun anew has
+  /// other salts.
+  std::string Copies() const {
+    const std::string salts = Bytes(32, 40);
+    return absl::StrCat(salts, Copied(), BegunToCopy());
+  }
+
+  /// Whether a process copies the log into the database now, or was killed while it did.
+  bool IsBeingCopied() const { return Copied() != BegunToCopy(); }
+
+  static constexpr int kHeaderBytes = 132;
 
   MappingGuard& guard_;
   WrittenFile& database_;
   WrittenFile& log_;
   volatile char* header_ = nullptr;
-  std::string seen_;
+  std::string seen_log_;
+  std::string seen_copies_;
 };
 
 /// A file of SQLite that is watched. SQLite's own file lies behind it in memory.
@@ -117,13 +148,20 @@ int UnmapIndex(sqlite3_file* file, int remove) {
 }
 
 int LockIndex(sqlite3_file* file, int offset, int count, int flags) {
-  constexpr int kLastLockOfWriters = 1;  // after the lock of changes that of copies
+  constexpr int kLockOfLog = 0;
+  constexpr int kLockOfCopies = 1;
   sqlite3_file& real = Real(file);
-  const bool writes = offset <= kLastLockOfWriters && (flags & SQLITE_SHM_EXCLUSIVE) != 0;
-  if (writes && (flags & SQLITE_SHM_UNLOCK) != 0) IndexOf(file).Leave();
-  const int result = real.pMethods->xShmLock(&real, offset, count, flags);
-  if (writes && (flags & SQLITE_SHM_LOCK) != 0 && result == SQLITE_OK) IndexOf(file).Enter();
-  return result;
+  const auto lock = [&](int how) { return real.pMethods->xShmLock(&real, offset, count, how); };
+  if (offset > kLockOfCopies || (flags & SQLITE_SHM_EXCLUSIVE) == 0) return lock(flags);
+  LogIndex& index = IndexOf(file);
+  if ((flags & SQLITE_SHM_UNLOCK) != 0) {
+    offset == kLockOfLog ? index.LeaveLog(real) : index.LeaveCopies();
+    return lock(flags);
+  }
+  const int result = lock(flags);
+  if (result != SQLITE_OK || index.Enter(real)) return result;
+  lock(SQLITE_SHM_UNLOCK | SQLITE_SHM_EXCLUSIVE);
+  return SQLITE_IOERR_SHMLOCK;
 }
 
 using Io = sqlite3_io_methods;
@@ -178,11 +216,18 @@ void WrittenFile::ReadHead(sqlite3_file& file) {
   knows_head_ = true;
 }
 
+void WrittenFile::TakeHead(sqlite3_file& file) {
+  const MutexLock lock(&mutex_);
+  ReadHead(file);
+}
+
 /// A file that cannot be read counts as unchanged, because what SQLite does next fails by itself.
-bool WrittenFile::HasHead(sqlite3_file& file) {
+bool WrittenFile::HasHead(sqlite3_file& file, absl::FunctionRef<bool()> must_be_ours) {
   const MutexLock lock(&mutex_);
   if (!knows_head_) ReadHead(file);
-  lost_ = lost_ || HeadNow(file, std::ssize(head_)).value_or(head_) != head_;
+  if (HeadNow(file, std::ssize(head_)).value_or(head_) == head_) return !lost_;
+  knows_head_ = must_be_ours();
+  lost_ = lost_ || knows_head_;
   return !lost_;
 }
 
@@ -210,7 +255,10 @@ void WrittenFile::Close() {
 }
 
 int WrittenFile::Write(sqlite3_file& file, const void* data, int size, int64_t offset) {
-  if (!IsWhole([&file] { return SizeNow(file); }) || !HasHead(file)) return SQLITE_IOERR_WRITE;
+  const auto has_lock = [] { return true; };
+  if (!IsWhole([&file] { return SizeNow(file); }) || !HasHead(file, has_lock)) {
+    return SQLITE_IOERR_WRITE;
+  }
   const int result = file.pMethods->xWrite(&file, data, size, offset);
   const MutexLock lock(&mutex_);
   if (result != SQLITE_OK) {

@@ -31,6 +31,12 @@ class WrittenFile {
 
   /// Notes that another process has changed the file by SQLite, so that it has other first bytes.
   void ForgetHead();
+  void TakeHead(sqlite3_file& file);
+
+  /// Returns whether the file is whole and has the first bytes that SQLite wrote. If it has others,
+  /// it is not whole from now on, unless `must_be_ours()` then returns false, because another
+  /// process may have changed them by SQLite.
+  bool HasHead(sqlite3_file& file, absl::FunctionRef<bool()> must_be_ours);
 
   /// Lets all later calls of Write and Truncate fail.
   void Close();
@@ -47,7 +53,6 @@ class WrittenFile {
  private:
   void ReadHead(sqlite3_file& file) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void NoteHead(const void* data, int size, int64_t offset) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool HasHead(sqlite3_file& file);
 
   const MappingGuard& index_;
   mutable Mutex mutex_;
@@ -60,8 +65,9 @@ class WrittenFile {
 
 /// A layer between SQLite and the operating system (a VFS) that knows what SQLite has written to a
 /// database file and its write-ahead log. It looks at a file's size and first bytes before each
-/// write, because a write beyond the end of a truncated file makes the file as large as it was. It
-/// also guards the mapping of the log's index (the -shm file), whose header tells it whether
+/// write, because a write beyond the end of a truncated file makes the file as large as it was, and
+/// at the first bytes of the database before each change, which goes to the log at first. It also
+/// guards the mapping of the log's index (the -shm file), whose header tells it whether
 /// another process has changed the files by SQLite.
 class WriteWatch {
  public:

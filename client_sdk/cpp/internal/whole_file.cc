@@ -38,6 +38,9 @@ absl::Status InUse(const std::string& path, const std::string& companion) {
                               " is beside it, and stays as it is: name another file"));
 }
 
+/// Follows a database's name in the names of copies that are being made. The daemon removes them.
+constexpr char kUnfinished[] = "-unfinished-";
+
 /// Refuses to replace a database of a daemon, or a file that belongs to one.
 absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final_path) {
   std::error_code ignored;
@@ -45,6 +48,10 @@ absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final
   if (const fs::path database = fs::path(final_path).replace_filename("carillon.db");
       fs::path(final_path).filename() == "lock" && fs::exists(database, ignored)) {
     return InUse(path, database);
+  }
+  if (const size_t end = final_path.rfind(kUnfinished); end != std::string::npos) {
+    const std::string database = final_path.substr(0, end);
+    if (fs::exists(database, ignored)) return InUse(path, database);
   }
   for (const char* const companion : kCompanions) {
     const std::string beside = final_path + companion;
@@ -65,37 +72,26 @@ bool IsOpenFile(const fs::path& path) {
   return absl::StartsWith(folder, "/proc/") && absl::EndsWith(folder, "/fd");
 }
 
-/// Returns the descriptor of the open file of this process to which the path leads, or -1 if there
-/// is none.
-int OpenDescriptorOf(fs::path path) {
-  std::error_code ignored;
-  const std::string own = absl::StrCat("/proc/", getpid(), "/fd");
-  for (int left = 40; left > 0 && fs::is_symlink(path, ignored); --left) {
-    int descriptor = -1;
-    if (fs::canonical(path.parent_path(), ignored) == own) {
-      return absl::SimpleAtoi(path.filename().string(), &descriptor) ? descriptor : -1;
-    }
-    const fs::path target = fs::read_symlink(path, ignored);
-    path = path.parent_path() / target;
-  }
-  return -1;
-}
-
-/// Returns the path with the file to which it leads, without symbolic links, or an empty path if
-/// the bytes go to that file at once, because it is a device or a pipe, or a process has it open.
-/// The file need not exist.
-fs::path WithoutLinks(const std::string& path, fs::file_type type) {
-  if (type != fs::file_type::regular && type != fs::file_type::not_found) return {};
+/// Follows symbolic links to a file, which need not exist, or to the name of a file that a process
+/// has open.
+fs::path Follow(const std::string& path) {
   std::error_code ignored;
   fs::path found = fs::absolute(path, ignored);
   // The system follows at most 40 links.
-  for (int left = 40; left > 0 && fs::is_symlink(found, ignored); --left) {
-    if (IsOpenFile(found)) return {};
+  for (int left = 40; left > 0 && fs::is_symlink(found, ignored) && !IsOpenFile(found); --left) {
     const fs::path target = fs::read_symlink(found, ignored);
     found = found.parent_path() / target;
   }
   const fs::path folder = fs::canonical(found.parent_path(), ignored);
   return folder.empty() ? found : folder / found.filename();
+}
+
+/// Returns the descriptor of the open file of this process that has the name `found`, or -1 if
+/// there is none.
+int OpenDescriptorOf(const fs::path& found) {
+  int descriptor = -1;
+  const bool is_own = found.parent_path() == absl::StrCat("/proc/", getpid(), "/fd");
+  return is_own && absl::SimpleAtoi(found.filename().string(), &descriptor) ? descriptor : -1;
 }
 
 /// Flushes the entry of a new name to the disk.
@@ -112,16 +108,18 @@ absl::StatusOr<WholeFile> WholeFile::Create(const std::string& path) {
   std::error_code ignored;
   const fs::file_type type = fs::status(path, ignored).type();
   if (type == fs::file_type::directory) return NotWritable(path, "it is a folder; name a file");
-  WholeFile file(path, WithoutLinks(path, type));
+  const fs::path found = Follow(path);
+  const bool has_place = type == fs::file_type::regular || type == fs::file_type::not_found;
+  // A device or a pipe, or a file that a process has open, takes the bytes at once.
+  WholeFile file(path, has_place && !IsOpenFile(found) ? found.string() : "");
   if (!file.final_path_.empty()) {
     RETURN_IF_ERROR(CheckIsNoDatabase(path, file.final_path_));
     RETURN_IF_ERROR(file.OpenBeside());
     return file;
   }
-  if (const int opened = OpenDescriptorOf(path); opened >= 0) {
+  if (const int opened = OpenDescriptorOf(found); opened >= 0) {
     // Opened anew, the file would lose what it has.
-    const fs::path target = fs::read_symlink(absl::StrCat("/proc/self/fd/", opened), ignored);
-    RETURN_IF_ERROR(CheckIsNoDatabase(path, target.string()));
+    RETURN_IF_ERROR(CheckIsNoDatabase(path, fs::read_symlink(found, ignored)));
     file.descriptor_ = fcntl(opened, F_DUPFD_CLOEXEC, 0);
   } else {
     file.descriptor_ = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);

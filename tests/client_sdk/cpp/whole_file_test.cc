@@ -93,6 +93,13 @@ TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
   EXPECT_TRUE(WholeFile::Create(file_).ok());
 }
 
+TEST_F(WholeFileTest, RefusesNamesThatTheDaemonRemoves) {
+  const std::string unfinished = file_.string() + "-unfinished-backup-1";
+  EXPECT_TRUE(WholeFile::Create(unfinished).ok());
+  Put(file_, "live");
+  EXPECT_THAT(Refused(unfinished), HasSubstr("OUTPUT_IN_USE: "));
+}
+
 TEST_F(WholeFileTest, RefusesTheLockOfADataFolder) {
   EXPECT_TRUE(WholeFile::Create(folder_ / "lock").ok());
   Put(folder_ / "carillon.db", "live");

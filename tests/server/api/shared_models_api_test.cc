@@ -170,7 +170,8 @@ TEST_F(SharedModelsApi, ARequestDoesNotChangeAPinnedModelOfOthers) {
   ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, pin, pinned).ok());
   v1::CreateModalModelResponse response;
   const auto create = &v1::ModalModelService::Stub::CreateModalModel;
-  EXPECT_TRUE(Call(*neighbours_, create, request, response).ok()) << "it has what is asked for";
+  EXPECT_TRUE(Call(*neighbours_, create, request, response).ok())
+      << "the model has every mode that this request wants";
   request.set_max_frequency_hz(1e9);
   for (int i = 0; i < 2; ++i) {
     ExpectRefused(Call(*neighbours_, create, request, response), grpc::PERMISSION_DENIED,

@@ -165,12 +165,17 @@ TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("segment 7 is   bad"));
 }
 
+/// Checks the outcome of a worker that somebody else has ended.
+void ExpectKilled(const Outcome& outcome, Verdict verdict, const std::string& message) {
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.verdict, verdict);
+  EXPECT_THAT(outcome.error.message(), HasSubstr(message));
+}
+
 TEST_F(LocalExecutorTest, ASignalFromOutsideIsNoFaultOfTheMesh) {
   const Outcome outcome = RunScript("kill -TERM $$");
-  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_TRUE(outcome.killed);
+  ExpectKilled(outcome, Verdict::kCrashed, "ended by signal 15 from outside");
   EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-  EXPECT_THAT(outcome.error.message(), HasSubstr("ended by signal 15 from outside"));
   EXPECT_THAT(outcome.error.message(), Not(HasSubstr("mesh")));
 }
 
@@ -184,22 +189,17 @@ TEST_F(LocalExecutorTest, AKillIsTheKernelsForLackOfMemoryIfTheKernelSaysSo) {
   options_.kernel_counts = folder_ / "vmstat";
   WriteBytes(options_.kernel_counts, "pgfault 7\noom_kill 3\nballoon_inflate 0\n");
   const Outcome outcome = RunScript("echo 'oom_kill 4' >\"$here/vmstat\"; kill -KILL $$");
-  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
-  EXPECT_TRUE(outcome.killed);
+  ExpectKilled(outcome, Verdict::kOutOfMemory, "by the system for lack of memory");
   EXPECT_EQ(outcome.error.reason(), "OUT_OF_MEMORY");
-  EXPECT_THAT(outcome.error.message(), HasSubstr("by the system for lack of memory"));
 }
 
 TEST_F(LocalExecutorTest, AKillWithoutALackOfMemoryIsSomebodyElses) {
   options_.kernel_counts = folder_ / "vmstat";
   WriteBytes(options_.kernel_counts, "oom_kill 3\n");
   const Outcome outcome = RunScript("kill -KILL $$");
-  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_TRUE(outcome.killed);
+  ExpectKilled(outcome, Verdict::kCrashed,
+               "signal 9 from outside, and not by the kernel for lack of memory: see who");
   EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-  EXPECT_THAT(
-      outcome.error.message(),
-      HasSubstr("signal 9 from outside, and not by the kernel for lack of memory: see who"));
 }
 
 TEST_F(LocalExecutorTest, AKillNamesBothCausesIfTheKernelDoesNotCount) {

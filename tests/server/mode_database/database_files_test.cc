@@ -13,6 +13,7 @@
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "proto/cpp/status_macros.h"
@@ -115,43 +116,6 @@ TEST_F(DatabaseFilesTest, ALogThatIsTruncatedAmidAChangeIsLost) {
     const auto truncate = [&] { std::filesystem::resize_file(log_, 0); };
     EXPECT_THAT(StoreMuch(database, truncate).ToString(), HasSubstr("DATABASE_LOST: "));
   });
-}
-
-/// Writes bytes over the beginning of a file that stays the same file, as `cp` does.
-void Overwrite(const std::filesystem::path& file, const std::string& bytes) {
-  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
-
-TEST_F(DatabaseFilesTest, AfterALargerDatabaseWasCopiedOverTheFileNothingIsAcknowledged) {
-  const TemporaryFolder folder;
-  ASSERT_TRUE(StoreMuch(*(*Database::Open(folder / "carillon.db")), [] {}).ok());
-  const std::string larger = ReadBytes(folder / "carillon.db");
-  Open();  // the log has gone into the file
-  ASSERT_GT(larger.size(), std::filesystem::file_size(file_));
-  Overwrite(file_, larger);
-  Database& database = database_->database();
-  EXPECT_THAT(StoreMuch(database, [] {}).ToString(), HasSubstr("DATABASE_LOST: "));
-  EXPECT_THAT(Put("new").ToString(), HasSubstr("DATABASE_LOST: "));
-  database_.reset();
-  EXPECT_EQ(ReadBytes(file_), larger);
-}
-
-TEST_F(DatabaseFilesTest, AChangeThatAnotherProgramMakesBySqliteIsNoDamage) {
-  const std::string update = "UPDATE models SET label = label || 'x';";
-  const std::string copy = "PRAGMA wal_checkpoint(RESTART);";
-  const std::string grow =
-      "CREATE TABLE IF NOT EXISTS a (b); INSERT INTO a VALUES (zeroblob(9e6));";
-  for (const std::string& change : {update, copy, copy + update, update + copy, grow, update}) {
-    ASSERT_TRUE((*SqliteConnection::Open(file_))->RunScript(change.c_str()).ok()) << change;
-    EXPECT_EQ(Put(change).ToString(), "OK") << change;
-    EXPECT_EQ(StoreMuch(database_->database(), [] {}).ToString(), "OK") << change;
-  }
-  ExpectLost([&] { Overwrite(log_, std::string(std::filesystem::file_size(log_), '\0')); });
-}
-
-TEST_F(DatabaseFilesTest, AfterTheLogWasOverwrittenInPlaceNothingIsAcknowledged) {
-  ExpectLost([&] { Overwrite(log_, std::string(std::filesystem::file_size(log_), '\0')); });
 }
 
 TEST_F(DatabaseFilesTest, FilesThatAreTouchedAreNotLost) {
@@ -367,13 +331,43 @@ TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {
   EXPECT_TRUE(written.ok()) << written;
 }
 
-TEST_F(DatabaseFilesTest, UnfinishedBackupsAreRemovedAtTheStart) {
-  const std::filesystem::path unfinished = NewBackupFile(file_);
-  const std::filesystem::path other = folder_ / "backup-2026";
-  for (const auto& path : {unfinished, other}) std::ofstream(path) << "x";
+TEST_F(DatabaseFilesTest, UnfinishedCopiesAreRemovedAtTheStartAndNothingElse) {
+  const std::vector<std::filesystem::path> unfinished = {
+      NewBackupFile(file_), UnfinishedCopy(file_, "restore"), UnfinishedCopy(file_, "repair-wal")};
+  // Names that an operator may give.
+  const std::vector<std::filesystem::path> others = {
+      folder_ / "backup-2026", folder_ / "carillon.db-backup-2026",
+      folder_ / "carillon.db.incoming", folder_ / "carillon.db.repaired"};
+  for (const auto& path : unfinished) std::ofstream(path) << "x";
+  for (const auto& path : others) std::ofstream(path) << "x";
   Open();
-  EXPECT_FALSE(std::filesystem::exists(unfinished));
-  EXPECT_TRUE(std::filesystem::exists(other));
+  for (const auto& path : unfinished) EXPECT_FALSE(std::filesystem::exists(path)) << path;
+  for (const auto& path : others) EXPECT_TRUE(std::filesystem::exists(path)) << path;
+}
+
+TEST_F(DatabaseFilesTest, ADatabaseMayLieWhereALinkLeads) {
+  const TemporaryFolder disk;
+  std::filesystem::create_symlink(disk / "real.db", folder_ / "link.db");
+  EXPECT_THAT(ModeDatabase::Open(folder_ / "link.db", clock_).status().ToString(),
+              HasSubstr("link.db cannot be opened: it is a symbolic link that leads to no file"));
+  EXPECT_FALSE(std::filesystem::exists(disk / "real.db"));
+  database_.reset();
+  std::filesystem::copy_file(file_, disk / "real.db");
+  database_ = *ModeDatabase::Open(folder_ / "link.db", clock_);
+  EXPECT_TRUE(Has("kept"));
+  ASSERT_TRUE(Put("another").ok());
+  ExpectLost([&] { std::filesystem::remove(disk / "real.db-wal"); });
+}
+
+TEST_F(DatabaseFilesTest, WhatIsNoFileIsNoDatabase) {
+  std::filesystem::create_directory(folder_ / "folder.db");
+  std::filesystem::create_symlink("loop.db", folder_ / "loop.db");
+  for (const auto& [name, why] : {std::pair("folder.db", "it is a folder; move it away"),
+                                  std::pair("loop.db", "leads to no file; mount the disk")}) {
+    const std::string error = ModeDatabase::Open(folder_ / name, clock_).status().ToString();
+    EXPECT_THAT(error, HasSubstr("DATABASE_UNUSABLE: "));
+    EXPECT_THAT(error, HasSubstr(why));
+  }
 }
 
 TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {

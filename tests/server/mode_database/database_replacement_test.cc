@@ -18,6 +18,7 @@
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/database_admin.h"
+#include "server/mode_database/database_files.h"
 #include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -52,7 +53,7 @@ class DatabaseReplacementTest : public ::testing::Test {
     return labels;
   }
 
-  /// Makes a database with a model in its log, as it is after a crash.
+  /// Makes the files that a daemon leaves if it is killed while its only model is in the log.
   void CopyWithLog(const std::string& name) {
     const path live = folder_ / "live";
     std::filesystem::remove_all(live);
@@ -165,6 +166,10 @@ TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) 
                 HasSubstr(std::string(name) + " is not a database of Carillon: name a file"));
     std::filesystem::remove(folder_ / name);
   }
+  std::filesystem::create_directory(folder_ / "folder");
+  EXPECT_THAT(RestoreDatabase(file_, folder_ / "folder").status().ToString(),
+              HasSubstr("DATABASE_UNUSABLE: "));
+  std::filesystem::remove(folder_ / "folder");
   EXPECT_THAT(Labels(file_), ElementsAre("old"));
   EXPECT_EQ(Names(), before);
 }
@@ -172,13 +177,59 @@ TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) 
 TEST_F(DatabaseReplacementTest, ADatabaseIsNotRestoredFromItself) {
   Put(file_, "old");
   std::filesystem::create_symlink(file_, folder_ / "link");
-  Put(folder_ / "carillon.db.incoming", "new");
-  for (const char* name : {"carillon.db", "link", "carillon.db.incoming"}) {
+  const path unfinished = UnfinishedCopy(file_, "restore");
+  Put(unfinished, "new");
+  for (const path& name : {path("carillon.db"), path("link"), unfinished.filename()}) {
     EXPECT_THAT(RestoreDatabase(file_, folder_ / name).status().ToString(),
                 HasSubstr("which the restore would replace: name a backup"));
   }
+  EXPECT_THAT(Labels(unfinished), ElementsAre("new"));
   EXPECT_THAT(Labels(file_), ElementsAre("old"));
-  EXPECT_THAT(Labels(folder_ / "carillon.db.incoming"), ElementsAre("new"));
+}
+
+TEST_F(DatabaseReplacementTest, ARestoreFollowsLinksToItsFiles) {
+  const path disk = folder_ / "disk";
+  std::filesystem::create_directory(disk);
+  Put(disk / "real.db", "old");
+  std::filesystem::create_symlink(disk / "real.db", file_);
+  CopyWithLog("copy");
+  std::filesystem::create_symlink("copy", folder_ / "newest");
+  const auto kept = RestoreDatabase(file_, folder_ / "newest");
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_TRUE(std::filesystem::is_symlink(file_));
+  EXPECT_THAT(Labels(disk / "real.db"), ElementsAre("in the log"));
+  EXPECT_THAT(Labels(*kept), ElementsAre("old"));
+  std::filesystem::remove(disk / "real.db");
+  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
+              HasSubstr("it is a symbolic link that leads to no file"));
+  EXPECT_TRUE(std::filesystem::is_symlink(file_));
+}
+
+TEST_F(DatabaseReplacementTest, AReplacementThatFailsIsUndoneAndDoesNotFollowLater) {
+  Put(file_, "old");
+  Put(folder_ / "copy", "new");
+  // A folder can be neither linked nor copied as a file is.
+  std::filesystem::remove(folder_ / "carillon.db-count");
+  std::filesystem::create_directory(folder_ / "carillon.db-count");
+  std::ofstream(folder_ / "carillon.db-wal") << "";
+  const std::vector<std::string> before = Names();
+  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
+              HasSubstr("carillon.db-count cannot be moved or copied"));
+  EXPECT_EQ(Names(), before);
+  EXPECT_THAT(Labels(file_), ElementsAre("old"));
+}
+
+TEST_F(DatabaseReplacementTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
+  Put(file_, "old");
+  Put(folder_ / "copy", "new");
+  for (const char* name : {"restore", "restore-wal", "repair", "repair-count"}) {
+    std::ofstream(UnfinishedCopy(file_, name)) << "a part";
+  }
+  std::ofstream(folder_ / "carillon.db.incoming") << "an operator's file";
+  ASSERT_TRUE(RestoreDatabase(file_, folder_ / "copy").ok());
+  EXPECT_THAT(Names(), Not(Contains(HasSubstr("-unfinished-"))));
+  EXPECT_THAT(Names(), Contains("carillon.db.incoming"));
+  EXPECT_THAT(Labels(file_), ElementsAre("new"));
 }
 
 TEST_F(DatabaseReplacementTest, WhatAKilledProgramHasBegunIsCompletedAtTheNextStart) {
