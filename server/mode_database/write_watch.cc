@@ -46,7 +46,11 @@ class LogIndex {
     if (header_ == nullptr) return true;
     if (Log() != seen_log_) log_.ForgetHead();
     if (Copies() != seen_copies_ || IsBeingCopied()) database_.ForgetHead();
-    return database_.HasHead(file, [this] { return Copies() == seen_copies_ && !IsBeingCopied(); });
+    return database_.HasHead(file, [&] {
+      // Whoever copies the log changes the header before the database.
+      file.pMethods->xShmBarrier(&file);
+      return Copies() == seen_copies_ && !IsBeingCopied();
+    });
   }
 
   /// Remembers the header, before this process gives back the lock of changes to the log.
@@ -65,7 +69,6 @@ class LogIndex {
 
  private:
   std::string Bytes(int begin, int end) const {
-    std::atomic_thread_fence(std::memory_order_seq_cst);
     std::string bytes(end - begin, '\0');
     std::copy(header_ + begin, header_ + end, bytes.begin());
     return bytes;
