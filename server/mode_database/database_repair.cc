@@ -148,18 +148,18 @@ absl::Status CopyToFresh(const std::filesystem::path& file, const std::filesyste
 
 }  // namespace
 
-absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& named,
+absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& file,
                                                      const OnFinding& on_finding) {
-  ASSIGN_OR_RETURN(const std::filesystem::path file, FollowLinks(named));
-  RETURN_IF_ERROR(CompleteReplacement(file));
-  RemoveUnfinishedCopies(file);
-  const std::filesystem::path fresh = UnfinishedCopy(file, "repair");
-  RETURN_IF_ERROR(ExtendCutFile(file));
-  if (absl::Status copied = CopyToFresh(file, fresh, on_finding); !copied.ok()) {
+  ASSIGN_OR_RETURN(const std::filesystem::path real, FollowLinks(file));
+  RETURN_IF_ERROR(CompleteReplacement(real));
+  RemoveUnfinishedCopies(real);
+  const std::filesystem::path fresh = UnfinishedCopy(real, "repair");
+  RETURN_IF_ERROR(ExtendCutFile(real));
+  if (absl::Status copied = CopyToFresh(real, fresh, on_finding); !copied.ok()) {
     RemoveDatabase(fresh);
     return copied;
   }
-  return ReplaceDatabase(file, fresh, "damaged");
+  return ReplaceDatabase(real, fresh, "damaged");
 }
 
 }  // namespace carillon

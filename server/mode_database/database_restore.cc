@@ -91,20 +91,20 @@ absl::Status CheckCopy(const path& file, const path& copy) {
 
 }  // namespace
 
-absl::StatusOr<path> RestoreDatabase(const path& named, const path& named_copy) {
-  ASSIGN_OR_RETURN(const path file, FollowLinks(named));
-  RETURN_IF_ERROR(CompleteReplacement(file));
+absl::StatusOr<path> RestoreDatabase(const path& file, const path& copy) {
+  ASSIGN_OR_RETURN(const path real, FollowLinks(file));
+  RETURN_IF_ERROR(CompleteReplacement(real));
   std::error_code error;
   // The copy's log is beside the file to which a link leads.
-  path copy = std::filesystem::weakly_canonical(named_copy, error);
-  if (error) copy = named_copy;
-  RETURN_IF_ERROR(CheckIsAnother(file, copy));
-  RemoveUnfinishedCopies(file);
-  std::filesystem::create_directories(file.parent_path(), error);
-  const path incoming = UnfinishedCopy(file, "restore");
-  absl::Status status = CopyFiles(copy, incoming);
-  if (status.ok()) status = CheckCopy(incoming, copy);
-  if (status.ok()) return ReplaceDatabase(file, incoming, "replaced");
+  path source = std::filesystem::weakly_canonical(copy, error);
+  if (error) source = copy;
+  RETURN_IF_ERROR(CheckIsAnother(real, source));
+  RemoveUnfinishedCopies(real);
+  std::filesystem::create_directories(real.parent_path(), error);
+  const path incoming = UnfinishedCopy(real, "restore");
+  absl::Status status = CopyFiles(source, incoming);
+  if (status.ok()) status = CheckCopy(incoming, source);
+  if (status.ok()) return ReplaceDatabase(real, incoming, "replaced");
   RemoveDatabase(incoming);
   return status;
 }
