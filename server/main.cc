@@ -20,6 +20,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/api_server.h"
@@ -155,13 +156,16 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   if (status.ok()) {
     // The outcome is logged if the old level or the new one lets it through.
     LowerLogLevel(changed.log_level);
-    if (!(changed == read->options)) {
+    if (const auto names = DifferentSettings(changed, read->options); !names.empty()) {
       spdlog::warn(
-          "some changed settings need a restart: a reload takes only the log level, the access "
-          "file and the TLS files into account, and does not begin or end the use of a file");
+          "these changed settings need a restart: {}; a reload takes only the log level, the "
+          "access file and the TLS files into account, and does not begin or end the use of a file",
+          absl::StrJoin(names, ", "));
     }
     options = changed;
-    spdlog::info("the configuration, the access file and the TLS files were read again");
+    spdlog::info(
+        "the configuration, the access file and the TLS files were read again; the log level is {}",
+        options.log_level);
     SetLogLevel(options.log_level);
   } else {
     spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));

@@ -45,7 +45,10 @@ std::string DefaultAddress() {
 std::string DefaultConfiguration() {
   const std::string folder = Environment("CONFIGURATION_DIRECTORY");
   const std::filesystem::path file = std::filesystem::path(folder) / "carillond.toml";
-  return !folder.empty() && std::filesystem::exists(file) ? file.string() : "";
+  // A file that this user may not see is an error, rather than no file.
+  std::error_code ignored;
+  const auto type = std::filesystem::status(file, ignored).type();
+  return folder.empty() || type == std::filesystem::file_type::not_found ? "" : file.string();
 }
 
 /// The path of a program in the folder of this executable.
@@ -127,6 +130,9 @@ absl::Status ReadValue(absl::string_view key, const toml::node& node,
   texts.clear();
   const toml::array* array = node.as_array();
   if (array == nullptr) return ReadValue(key, node, texts.emplace_back());
+  if (array->empty()) {
+    return InvalidConfiguration(absl::StrCat(key, " names nothing; write at least one address"));
+  }
   for (const toml::node& element : *array) {
     RETURN_IF_ERROR(ReadValue(key, element, texts.emplace_back()));
   }
@@ -164,10 +170,7 @@ absl::Status MistakeIn(const std::string& path, uint32_t line, absl::string_view
 }
 
 absl::Status ReadFile(const std::string& path, Options& options) {
-  // A folder can be opened, and would be an empty file.
-  if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) {
-    return MistakeIn(path, 0, "it is a folder; name a TOML file");
-  }
+  RETURN_IF_ERROR(CheckIsFile(path));
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
@@ -308,17 +311,6 @@ void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
       ->required();
 }
 
-/// A flag that ends in "=" would take the next flag for its value.
-absl::Status CheckValues(int argc, const char* const* argv) {
-  for (int i = 1; i < argc; ++i) {
-    const absl::string_view word = argv[i];
-    if (absl::StartsWith(word, "--") && word.find('=') == word.size() - 1) {
-      return InvalidConfiguration(absl::StrCat("nothing follows ", word, " in the command line"));
-    }
-  }
-  return absl::OkStatus();
-}
-
 /// Parses the flags into `command`. Absent if the program is to run; otherwise its exit status.
 std::optional<int> ParseFlags(int argc, const char* const* argv, const std::string& version,
                               std::string& configuration, CommandLine& command) {
@@ -365,6 +357,18 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
   RETURN_IF_ERROR(Check(command.options));
   command.run = true;
   return command;
+}
+
+std::vector<std::string> DifferentSettings(const Options& first, const Options& second) {
+  std::vector<std::string> names;
+  VisitSettings(first, [&](absl::string_view name, const auto& one) {
+    VisitSettings(second, [&](absl::string_view other_name, const auto& other) {
+      if constexpr (std::is_same_v<decltype(one), decltype(other)>) {
+        if (name == other_name && one != other) names.emplace_back(name);
+      }
+    });
+  });
+  return names;
 }
 
 std::string PrintConfiguration(const Options& options) {

@@ -74,6 +74,9 @@ struct CommandLine {
 absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version);
 
+/// Returns the names, as in the configuration file, of the settings that differ.
+std::vector<std::string> DifferentSettings(const Options& first, const Options& second);
+
 /// Returns the settings as the text of a configuration file.
 std::string PrintConfiguration(const Options& options);
 

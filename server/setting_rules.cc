@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <system_error>
 
 #include "absl/algorithm/container.h"
 #include "absl/strings/ascii.h"
@@ -93,8 +95,27 @@ absl::Status CheckText(absl::string_view key, absl::string_view name, absl::stri
   return absl::OkStatus();
 }
 
+absl::Status CheckValues(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const absl::string_view word = argv[i];
+    if (absl::StartsWith(word, "--") && word.find('=') == word.size() - 1) {
+      return InvalidConfiguration(absl::StrCat("nothing follows ", word, " in the command line"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckIsFile(const std::string& path) {
+  // A folder can be opened, and would be an empty file. A named pipe would wait for a writer.
+  std::error_code ignored;
+  const bool is_folder = std::filesystem::is_directory(path, ignored);
+  const auto type = std::filesystem::symlink_status(path, ignored).type();
+  if (!is_folder && type != std::filesystem::file_type::fifo) return absl::OkStatus();
+  return InvalidConfiguration(
+      absl::StrCat(path, ": it is a ", is_folder ? "folder" : "named pipe", "; name a TOML file"));
+}
+
 absl::Status CheckTogether(const Options& options) {
-  if (options.addresses.empty()) return InvalidConfiguration("--listen names no address");
   if (absl::c_linear_search(options.addresses, options.metrics_address)) {
     return InvalidConfiguration(absl::StrCat("--listen and --metrics both name ",
                                              options.metrics_address,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "server/options.h"
@@ -17,6 +19,13 @@ absl::Status CheckNumber(absl::string_view key, absl::string_view name, double v
 
 /// Checks one setting that is a text. Errors: those of CheckNumber.
 absl::Status CheckText(absl::string_view key, absl::string_view name, absl::string_view value);
+
+/// Checks that no flag of the command line ends in "=", because it would take the next flag for its
+/// value. Errors: those of CheckNumber.
+absl::Status CheckValues(int argc, const char* const* argv);
+
+/// Checks that a path can be that of a configuration file. Errors: those of CheckNumber.
+absl::Status CheckIsFile(const std::string& path);
 
 /// Checks which settings are given together. Errors: those of CheckNumber.
 absl::Status CheckTogether(const Options& options);

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "proto/cpp/error_reason.h"
@@ -65,8 +66,12 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, absl::string_view 
   // Without O_NONBLOCK a named pipe would wait for a writer.
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   if (file < 0) {
-    return Unusable(path, reason,
-                    absl::StrCat("cannot be opened: ", std::generic_category().message(errno)));
+    const std::string why = std::generic_category().message(errno);
+    const bool looks_like_shell = absl::StartsWith(path, "~") || absl::StrContains(path, "$");
+    return Unusable(
+        path, reason,
+        absl::StrCat("cannot be opened: ", why,
+                     looks_like_shell ? "; write the whole path, without ~ and $" : ""));
   }
   const absl::Cleanup close_file = [file] { close(file); };
   struct stat status {};

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +17,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 absl::StatusOr<CommandLine> Read(std::vector<const char*> arguments) {
   arguments.insert(arguments.begin(), "carillond");
@@ -82,7 +84,6 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("block_frames = 4096\n", " line 1: block_frames is 4096");
   expect("memory_budget_mib = 1099511627777\n", "is 1099511627777; it must be 0 to 1099511627776");
   expect("executor = \"cloud\"\n", " line 1: executor is \"cloud\"; it must be local or slurm");
-  expect("listen = []\n", "--listen");
   expect("tls_key = \"key.pem\"\n", "--tls-certificate");
   expect("a = \n", "line 1");
   expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
@@ -120,6 +121,8 @@ TEST_F(OptionsFile, MetricsHaveOneAddress) {
     ExpectRefused(std::string("metrics = \"") + address + "\"\n",
                   "; it must be one HOST:PORT with an IPv4 address or a name");
   }
+  ExpectRefused("gain = 1\nlisten = []\n",
+                " line 2: listen names nothing; write at least one address");
   ExpectRefused("listen = \"127.0.0.1:1\"\nmetrics = \"127.0.0.1:1\"\n",
                 "--listen and --metrics both name 127.0.0.1:1");
 }
@@ -148,6 +151,21 @@ TEST(Options, AFileThatIsNotThereIsRefused) {
 TEST(Options, AFolderIsNoConfiguration) {
   EXPECT_THAT(Read({"--config", "/"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: /: it is a folder"));
+}
+
+TEST_F(OptionsFile, ANamedPipeIsNoConfiguration) {
+  const char* const file = Write("");
+  std::filesystem::remove(file);
+  ASSERT_EQ(mkfifo(file, 0600), 0);
+  EXPECT_THAT(Read({"--config", file}).status().ToString(),
+              HasSubstr(std::string(file) + ": it is a named pipe; name a TOML file"));
+}
+
+TEST_F(OptionsFile, NamesTheSettingsThatDiffer) {
+  const Options first = Read({"--config", Write("gain = 0.5\nworkers = 1\n")})->options;
+  const Options second = Read({"--config", Write("gain = 0.25\nlisten = [\"unix:a\"]\n")})->options;
+  EXPECT_THAT(DifferentSettings(first, second), ElementsAre("listen", "gain", "workers"));
+  EXPECT_THAT(DifferentSettings(first, first), IsEmpty());
 }
 
 TEST_F(OptionsFile, TheLogLevelIsInfoUnlessAnotherIsNamed) {
