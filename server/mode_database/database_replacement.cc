@@ -57,7 +57,7 @@ absl::Status Sync(const path& file) {
 absl::Status Rename(const path& from, const path& to) {
   std::error_code error;
   std::filesystem::rename(from, to, error);
-  return error ? CannotMove(from, error) : absl::OkStatus();
+  return error ? CannotMove(to, error) : absl::OkStatus();
 }
 
 /// Gives a file a second name. Copies the file where the file system has no hard links.
@@ -99,7 +99,9 @@ absl::Status WriteMarker(const path& file, const path& fresh, const path& kept) 
 /// Undoes what a replacement that cannot be completed has done before the new database took the
 /// place of `file`.
 void Undo(const path& file, const path& fresh, const path& kept) {
-  if (!Link(kept.string() + "-wal", file.string() + "-wal").ok()) return;
+  for (const char* suffix : {"-wal", "-count"}) {
+    if (!Link(kept.string() + suffix, file.string() + suffix).ok()) return;
+  }
   std::error_code ignored;
   const path marker = MarkerOf(file);
   for (const path& left : {marker, path(marker.string() + ".part")}) {
@@ -124,7 +126,7 @@ absl::Status CannotMove(const path& file, const std::error_code& error) {
                                 ": free some on its disk, and try again"));
   }
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat(file.string(), " cannot be moved or copied (", error.message(),
+                 absl::StrCat(file.string(), " cannot be copied or replaced (", error.message(),
                               "): see that this user may read it, and write in the data folder"));
 }
 
@@ -150,12 +152,13 @@ absl::Status CompleteReplacement(const path& file) {
     for (const char* suffix : kContentSuffixes) {
       RETURN_IF_ERROR(Link(file.string() + suffix, kept.string() + suffix));
     }
-    // The log of the old database must not be applied to the new one.
-    const path log = file.string() + "-wal";
-    std::error_code error;
-    std::filesystem::remove(log, error);
-    if (error) return CannotMove(log, error);
-    std::filesystem::remove(file.string() + "-shm", ignored);
+    // The log and the count of the old database must not be taken for those of the new one.
+    for (const char* suffix : {"-wal", "-count", "-shm"}) {
+      const path companion = file.string() + suffix;
+      std::error_code error;
+      std::filesystem::remove(companion, error);
+      if (error) return CannotMove(companion, error);
+    }
     RETURN_IF_ERROR(Rename(fresh, file));
   }
   const path fresh_count = fresh.string() + "-count";

@@ -4,8 +4,12 @@
 
 #include "server/mode_database/database_replacement.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/fs.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -214,9 +218,37 @@ TEST_F(DatabaseReplacementTest, AReplacementThatFailsIsUndoneAndDoesNotFollowLat
   std::ofstream(folder_ / "carillon.db-wal") << "";
   const std::vector<std::string> before = Names();
   EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
-              HasSubstr("carillon.db-count cannot be moved or copied"));
+              HasSubstr("carillon.db-count cannot be copied or replaced"));
   EXPECT_EQ(Names(), before);
   EXPECT_THAT(Labels(file_), ElementsAre("old"));
+}
+
+/// Makes a file immutable, or takes that back. Returns whether this user and the file system can.
+bool SetImmutable(const path& file, bool immutable) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  int flags = 0;
+  bool can = ioctl(descriptor, FS_IOC_GETFLAGS, &flags) == 0;
+  flags = immutable ? flags | FS_IMMUTABLE_FL : flags & ~FS_IMMUTABLE_FL;
+  can = can && ioctl(descriptor, FS_IOC_SETFLAGS, &flags) == 0;
+  close(descriptor);
+  return can;
+}
+
+TEST_F(DatabaseReplacementTest, AnImmutableFileOfTheOldDatabaseKeepsItInPlace) {
+  Put(folder_ / "copy", "new");
+  for (const char* name :
+       {"carillon.db", "carillon.db-wal", "carillon.db-count", "carillon.db-shm"}) {
+    Put(file_, "old");
+    { const std::ofstream empty(folder_ / name, std::ios::app); }
+    if (!SetImmutable(folder_ / name, true)) GTEST_SKIP() << "no file can be made immutable here";
+    const std::string error = RestoreDatabase(file_, folder_ / "copy").status().ToString();
+    ASSERT_TRUE(SetImmutable(folder_ / name, false));
+    EXPECT_THAT(error, HasSubstr(std::string(name) + " cannot be copied or replaced")) << name;
+    EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace")))) << name;
+    EXPECT_THAT(Names(), Not(Contains(HasSubstr("unfinished")))) << name;
+    EXPECT_THAT(Labels(file_), ElementsAre("old")) << name;
+    EXPECT_THAT((*Database::Open(file_))->MissingChanges(), IsEmpty()) << name;
+  }
 }
 
 TEST_F(DatabaseReplacementTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
