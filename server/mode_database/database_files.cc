@@ -14,9 +14,11 @@
 #include <system_error>
 #include <utility>
 
-#include "absl/strings/match.h"
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -34,6 +36,20 @@ std::filesystem::path LogOf(const std::filesystem::path& file) { return file.str
 
 std::filesystem::path CountOf(const std::filesystem::path& file) {
   return file.string() + "-count";
+}
+
+/// Whether `name` is that of an unfinished copy of the database `file`, or of a file that SQLite or
+/// the daemon keeps beside such a copy. An operator may give other names.
+bool IsUnfinishedCopy(absl::string_view name, const std::string& file) {
+  constexpr std::array<absl::string_view, 7> kSuffixes = {"",       "-wal",     "-shm", "-journal",
+                                                          "-count", "-reserve", "-lost"};
+  if (!absl::ConsumePrefix(&name, file + kUnfinishedSuffix)) return false;
+  if (absl::ConsumePrefix(&name, "backup-")) {
+    name.remove_prefix(std::min(name.find_first_not_of("0123456789"), name.size()));
+  } else if (!absl::ConsumePrefix(&name, "restore") && !absl::ConsumePrefix(&name, "repair")) {
+    return false;
+  }
+  return absl::c_linear_search(kSuffixes, name);
 }
 
 absl::Status IsNoFile(const std::filesystem::path& file, absl::string_view why) {
@@ -173,10 +189,9 @@ std::filesystem::path NewBackupFile(const std::filesystem::path& file) {
 }
 
 void RemoveUnfinishedCopies(const std::filesystem::path& file) {
-  const std::string prefix = file.filename().string() + kUnfinishedSuffix;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), error)) {
-    if (!absl::StartsWith(entry.path().filename().string(), prefix)) continue;
+    if (!IsUnfinishedCopy(entry.path().filename().string(), file.filename().string())) continue;
     std::filesystem::remove(entry.path(), error);
   }
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <cstring>
 #include <iterator>
 #include <optional>
@@ -44,6 +45,10 @@ class LogIndex {
   /// Leave, and returns whether the database `file` has the first bytes that SQLite wrote.
   bool Enter(sqlite3_file& file) {
     if (header_ == nullptr) return true;
+    if (HasFewerFrames()) {
+      log_.Close();
+      return false;
+    }
     if (Log() != seen_log_) log_.ForgetHead();
     if (Copies() != seen_copies_ || IsBeingCopied()) database_.ForgetHead();
     return database_.HasHead(file, [&] {
@@ -77,6 +82,23 @@ class LogIndex {
   // https://www.sqlite.org/walformat.html#the_wal_index_file_format: two copies of a header that
   // changes with every change of the log.
   std::string Log() const { return Bytes(0, 96); }
+
+  /// Whether the log has fewer frames than at the last Leave and was not begun anew, as in an older
+  /// copy of the index. SQLite would overwrite the frames that are missing in it.
+  bool HasFewerFrames() const {
+    constexpr int kFrames = 16;
+    constexpr int kSalts = 32;
+    const std::string now = Log();
+    if (seen_log_.empty() || now.substr(kSalts, 8) != seen_log_.substr(kSalts, 8)) return false;
+    return FrameCount(now.substr(kFrames, 4)) < FrameCount(seen_log_.substr(kFrames, 4));
+  }
+
+  /// Returns a number that SQLite wrote in this machine's byte order.
+  static uint32_t FrameCount(const std::string& bytes) {
+    uint32_t count = 0;
+    std::memcpy(&count, bytes.data(), sizeof(count));
+    return count;
+  }
 
   /// The number of frames that were copied into the database, and of those that somebody has begun
   /// to copy.

@@ -24,8 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Suffixes of the files that belong to a database and have its name.
-constexpr const char* kCompanions[] = {"-wal",     "-shm",  "-count",
-                                       "-reserve", "-lost", "-replacement"};
+constexpr const char* kCompanions[] = {"-wal",  "-shm",         "-count",  "-reserve",
+                                       "-lost", "-replacement", "-journal"};
 
 absl::Status NotWritable(const std::string& path, absl::string_view why) {
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
@@ -47,6 +47,12 @@ absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final
   // Whoever replaces the lock of a data folder lets a second daemon in.
   if (const fs::path database = fs::path(final_path).replace_filename("carillon.db");
       fs::path(final_path).filename() == "lock" && fs::exists(database, ignored)) {
+    return InUse(path, database);
+  }
+  // The daemon removes the folder "work" when it starts.
+  const fs::path folder = fs::path(final_path).parent_path();
+  if (const fs::path database = fs::path(folder).replace_filename("carillon.db");
+      folder.filename() == "work" && fs::exists(database, ignored)) {
     return InUse(path, database);
   }
   if (const size_t end = final_path.rfind(kUnfinished); end != std::string::npos) {

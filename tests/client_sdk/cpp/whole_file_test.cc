@@ -79,7 +79,8 @@ TEST_F(WholeFileTest, FollowsLinksToAFileThatMayBeMissing) {
 }
 
 TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
-  for (const char* companion : {"-wal", "-shm", "-count", "-reserve", "-lost", "-replacement"}) {
+  for (const char* companion :
+       {"-wal", "-shm", "-count", "-reserve", "-lost", "-replacement", "-journal"}) {
     const std::string beside = file_.string() + companion;
     Put(file_, "live");
     Put(beside, "live");
@@ -104,6 +105,13 @@ TEST_F(WholeFileTest, RefusesTheLockOfADataFolder) {
   EXPECT_TRUE(WholeFile::Create(folder_ / "lock").ok());
   Put(folder_ / "carillon.db", "live");
   EXPECT_THAT(Refused(folder_ / "lock"), HasSubstr("OUTPUT_IN_USE: "));
+}
+
+TEST_F(WholeFileTest, RefusesTheFolderWork) {
+  fs::create_directory(folder_ / "work");
+  EXPECT_TRUE(WholeFile::Create(folder_ / "work/copy.db").ok());
+  Put(folder_ / "carillon.db", "live");
+  EXPECT_THAT(Refused(folder_ / "work/copy.db"), HasSubstr("OUTPUT_IN_USE: "));
 }
 
 TEST_F(WholeFileTest, LeavesAFileInMemoryAsItIsUnlessItIsPublished) {

@@ -336,8 +336,12 @@ TEST_F(DatabaseFilesTest, UnfinishedCopiesAreRemovedAtTheStartAndNothingElse) {
       NewBackupFile(file_), UnfinishedCopy(file_, "restore"), UnfinishedCopy(file_, "repair-wal")};
   // Names that an operator may give.
   const std::vector<std::filesystem::path> others = {
-      folder_ / "backup-2026", folder_ / "carillon.db-backup-2026",
-      folder_ / "carillon.db.incoming", folder_ / "carillon.db.repaired"};
+      folder_ / "backup-2026",
+      folder_ / "carillon.db-backup-2026",
+      folder_ / "carillon.db.incoming",
+      folder_ / "carillon.db.repaired",
+      folder_ / "carillon.db-unfinished-backup-notes",
+      folder_ / "carillon.db-unfinished-work"};
   for (const auto& path : unfinished) std::ofstream(path) << "x";
   for (const auto& path : others) std::ofstream(path) << "x";
   Open();

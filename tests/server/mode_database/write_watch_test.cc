@@ -129,6 +129,31 @@ TEST_F(WriteWatchTest, ALogThatWasOverwrittenIsLost) {
   ExpectLost("log");
 }
 
+TEST_F(WriteWatchTest, AnOlderIndexOfTheLogIsNoticedBeforeItsFramesAreOverwritten) {
+  const std::filesystem::path index = folder_ / "carillon.db-shm";
+  ASSERT_TRUE(StoreLittle(*database_).ok());
+  const std::string older = ReadBytes(index);
+  ASSERT_TRUE(StoreLittle(*database_).ok());
+  const auto count_rows = [&] {
+    int64_t count = 0;
+    EXPECT_TRUE(database_
+                    ->Read([&](SqliteConnection& connection) {
+                      return connection.Query("SELECT count(*) FROM rows", {},
+                                              [&](const SqlRow& row) {
+                                                count = row.Int(0);
+                                                return absl::OkStatus();
+                                              });
+                    })
+                    .ok());
+    return count;
+  };
+  const int64_t acknowledged = count_rows();
+  Overwrite(index, older);
+  ExpectLost("index");
+  Open();
+  EXPECT_EQ(count_rows(), acknowledged);
+}
+
 TEST_F(WriteWatchTest, AChangeThatAnotherProgramMakesBySqliteIsNoDamage) {
   const std::string update = "UPDATE facts SET value = value;";
   const std::string copy = "PRAGMA wal_checkpoint(RESTART);";
