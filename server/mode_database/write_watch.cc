@@ -51,19 +51,20 @@ class LogIndex {
     }
     if (Log() != seen_log_) log_.ForgetHead();
     if (Copies() != seen_copies_ || IsBeingCopied()) database_.ForgetHead();
-    return database_.HasHead(file, [&] {
-      // Whoever copies the log changes the header before the database.
-      file.pMethods->xShmBarrier(&file);
-      return Copies() == seen_copies_ && !IsBeingCopied();
-    });
+    return HasHead(file);
   }
 
-  /// Remembers the header, before this process gives back the lock of changes to the log.
+  /// Remembers the header, before this process gives back the lock of changes to the log. Looks at
+  /// the database `file` again, because somebody may have overwritten it during the change.
   void LeaveLog(sqlite3_file& file) {
     if (header_ == nullptr) return;
     seen_log_ = Log();
-    // Another process may have copied the log meanwhile.
-    if (Copies() != seen_copies_) database_.TakeHead(file);
+    if (Copies() == seen_copies_) {
+      HasHead(file);
+      return;
+    }
+    // This process has begun the log anew, or another one has copied it meanwhile.
+    database_.TakeHead(file);
     seen_copies_ = Copies();
   }
 
@@ -73,6 +74,14 @@ class LogIndex {
   }
 
  private:
+  bool HasHead(sqlite3_file& file) {
+    return database_.HasHead(file, [&] {
+      // Whoever copies the log changes the header before the database.
+      file.pMethods->xShmBarrier(&file);
+      return Copies() == seen_copies_ && !IsBeingCopied();
+    });
+  }
+
   std::string Bytes(int begin, int end) const {
     std::string bytes(end - begin, '\0');
     std::copy(header_ + begin, header_ + end, bytes.begin());

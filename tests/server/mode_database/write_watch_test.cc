@@ -111,6 +111,15 @@ TEST_F(WriteWatchTest, NoChangeIsAcknowledgedAfterTheBeginningOfTheFileWasOverwr
   }
 }
 
+TEST_F(WriteWatchTest, AChangeDuringWhichTheFileWasOverwrittenIsNotAcknowledged) {
+  ASSERT_TRUE(StoreLittle(*database_).ok());  // begins the log anew
+  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+    Overwrite(file_, std::string(100, '\0'));
+    return connection.Run("INSERT INTO rows VALUES ('')");
+  });
+  EXPECT_THAT(status.ToString(), HasSubstr("DATABASE_LOST: "));
+}
+
 TEST_F(WriteWatchTest, AFileThatIsOverwrittenAfterACrashIsLost) {
   ASSERT_TRUE(StoreLittle(*database_).ok());
   const TemporaryFolder crashed;
