@@ -95,31 +95,28 @@ class LogIndex {
   /// Whether the log has fewer frames than at the last Leave and was not begun anew, as in an older
   /// copy of the index. SQLite would overwrite the frames that are missing in it.
   bool HasFewerFrames() const {
-    constexpr int kFrames = 16;
-    constexpr int kSalts = 32;
     const std::string now = Log();
-    if (seen_log_.empty() || now.substr(kSalts, 8) != seen_log_.substr(kSalts, 8)) return false;
-    return FrameCount(now.substr(kFrames, 4)) < FrameCount(seen_log_.substr(kFrames, 4));
+    return !seen_log_.empty() && Salts(now) == Salts(seen_log_) &&
+           FrameCount(now) < FrameCount(seen_log_);
   }
 
-  /// Returns a number that SQLite wrote in this machine's byte order.
-  static uint32_t FrameCount(const std::string& bytes) {
+  /// Returns the number of frames in a log with this header, which has the machine's byte order.
+  static uint32_t FrameCount(const std::string& header) {
     uint32_t count = 0;
-    std::memcpy(&count, bytes.data(), sizeof(count));
+    std::memcpy(&count, header.data() + 16, sizeof(count));
     return count;
   }
+
+  /// Returns the salts of a log with this header. A log that is begun anew has others.
+  static std::string Salts(const std::string& header) { return header.substr(32, 8); }
 
   /// The number of frames that were copied into the database, and of those that somebody has begun
   /// to copy.
   std::string Copied() const { return Bytes(96, 100); }
   std::string BegunToCopy() const { return Bytes(128, kHeaderBytes); }
 
-  /// Bytes that change with every copy of the log into the database. A log that is begun anew has
-  /// other salts.
-  std::string Copies() const {
-    const std::string salts = Bytes(32, 40);
-    return absl::StrCat(salts, Copied(), BegunToCopy());
-  }
+  /// Bytes that change with every copy of the log into the database.
+  std::string Copies() const { return absl::StrCat(Salts(Log()), Copied(), BegunToCopy()); }
 
   /// Whether a process copies the log into the database now, or was killed while it did.
   bool IsBeingCopied() const { return Copied() != BegunToCopy(); }

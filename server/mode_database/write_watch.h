@@ -31,6 +31,8 @@ class WrittenFile {
 
   /// Notes that another process has changed the file by SQLite, so that it has other first bytes.
   void ForgetHead();
+
+  /// Takes the first bytes that the file has now for those that SQLite wrote.
   void TakeHead(sqlite3_file& file);
 
   /// Returns whether the file is whole and has the first bytes that SQLite wrote. If it has others,
@@ -66,8 +68,8 @@ class WrittenFile {
 /// A layer between SQLite and the operating system (a VFS) that knows what SQLite has written to a
 /// database file and its write-ahead log. It looks at a file's size and first bytes before each
 /// write, because a write beyond the end of a truncated file makes the file as large as it was, and
-/// at the first bytes of the database before each change, which goes to the log at first. It also
-/// guards the mapping of the log's index (the -shm file), whose header tells it whether
+/// at the first bytes of the database before and after each change, which goes to the log at first.
+/// It also guards the mapping of the log's index (the -shm file), whose header tells it whether
 /// another process has changed the files by SQLite.
 class WriteWatch {
  public:

@@ -27,6 +27,9 @@ namespace fs = std::filesystem;
 constexpr const char* kCompanions[] = {"-wal",  "-shm",         "-count",  "-reserve",
                                        "-lost", "-replacement", "-journal"};
 
+/// Follows a database's name in the names of copies that are being made. The daemon removes them.
+constexpr char kUnfinished[] = "-unfinished-";
+
 absl::Status NotWritable(const std::string& path, absl::string_view why) {
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat(path, " cannot be written: ", why));
@@ -37,9 +40,6 @@ absl::Status InUse(const std::string& path, const std::string& companion) {
                  absl::StrCat(path, " belongs to the database of a daemon, because ", companion,
                               " is beside it, and stays as it is: name another file"));
 }
-
-/// Follows a database's name in the names of copies that are being made. The daemon removes them.
-constexpr char kUnfinished[] = "-unfinished-";
 
 /// Refuses to replace a database of a daemon, or a file that belongs to one.
 absl::Status CheckIsNoDatabase(const std::string& path, const std::string& final_path) {
