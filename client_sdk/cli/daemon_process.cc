@@ -13,7 +13,6 @@
 #include <iterator>
 #include <limits>
 #include <system_error>
-#include <vector>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/numbers.h"
@@ -96,9 +95,20 @@ absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path) {
 std::string ProcessName(pid_t process) {
   // The kernel gives no number for a process of another PID namespace.
   if (process == 0) return "a process of another PID namespace";
+  const std::string name = ProgramOf(process);
+  return name.empty() ? absl::StrCat("process ", process)
+                      : absl::StrCat(name, " (process ", process, ")");
+}
+
+std::string ProgramOf(pid_t process) {
   const std::string name = Read(absl::StrCat("/proc/", process, "/comm"));
-  if (name.empty()) return absl::StrCat("process ", process);
-  return absl::StrCat(absl::StripSuffix(name, "\n"), " (process ", process, ")");
+  return std::string(absl::StripSuffix(name, "\n"));
+}
+
+std::vector<std::string> ArgumentsOf(pid_t process) {
+  const std::string words = Read(absl::StrCat("/proc/", process, "/cmdline"));
+  if (words.empty()) return {};
+  return absl::StrSplit(absl::StripSuffix(words, absl::string_view("\0", 1)), '\0');
 }
 
 bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -18,6 +19,14 @@ absl::StatusOr<pid_t> ProcessAt(const std::string& socket_path);
 
 /// Returns a process as "carillond (process 123)", as far as this user can see it.
 std::string ProcessName(pid_t process);
+
+/// Returns the name of the program that the process executes, "carillond" for instance, or nothing
+/// if this user cannot see it.
+std::string ProgramOf(pid_t process);
+
+/// Returns the words of the process's command line, of which the first one names the program. They
+/// are none if this user cannot see them.
+std::vector<std::string> ArgumentsOf(pid_t process);
 
 /// Returns whether the process at a Unix socket takes no connection, or sends nothing on one within
 /// the time. A daemon sends its HTTP/2 settings at once. If no process listens there, the result is

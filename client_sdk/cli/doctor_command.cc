@@ -18,6 +18,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "client_sdk/cli/daemon_process.h"
+#include "client_sdk/cli/daemon_settings.h"
 #include "client_sdk/cli/findings.h"
 #include "client_sdk/cli/health.h"
 #include "client_sdk/cli/output.h"
@@ -99,8 +100,8 @@ void CheckSound(const client::Client& daemon, const v1::GetMixerResponse& mixer,
   } else if (!serves) {
     findings.Bad("sound", absl::StrCat("carillon.v1.AudioService is NOT_SERVING, and plays on ",
                                        mixer.device(),
-                                       ": the wanted device does not play or loses frames: see the "
-                                       "daemon's log, and the load below"));
+                                       ": the wanted device does not play or take the sound: see "
+                                       "the daemon's log"));
   } else if (mixer.device() == "null") {
     findings.Unknown("sound", "plays on null, to nobody but `carillon listen`: see --audio-device");
   } else {
@@ -232,6 +233,25 @@ void CheckCertificates(const client::Client& daemon, Findings& findings) {
                             "reload the daemon (systemctl reload carillond)"));
 }
 
+/// Finds nothing about the settings of a daemon that runs elsewhere or in a container.
+void CheckSettings(const Program& program, Findings& findings) {
+  absl::string_view path = program.server;
+  if (!absl::ConsumePrefix(&path, "unix:")) return;
+  const absl::StatusOr<pid_t> process = ProcessAt(std::string(path));
+  if (!process.ok() || *process == 0) return;
+  const std::optional<absl::Status> checked = CheckSettingsOf(*process);
+  if (!checked) {
+    findings.Unknown("settings",
+                     "run this as root or as the user of the daemon to have its settings, and the "
+                     "files that they name, checked as at a start");
+  } else if (checked->ok()) {
+    findings.Good("settings", "the daemon would start again with the files as they are");
+  } else {
+    findings.Bad("settings", absl::StrCat("the daemon runs, but would not start again: ",
+                                          Text(*checked)));
+  }
+}
+
 /// Returns whether the process at the daemon's socket answers at all. A call would wait for 20 s.
 bool CheckAnswers(const Program& program, Findings& findings) {
   absl::string_view path = program.server;
@@ -249,6 +269,7 @@ void CheckDaemon(const Program& program, Findings& findings) {
   const auto daemon = program.Daemon();
   const auto mixer = daemon->GetMixer();
   CheckProcess(program, findings);
+  CheckSettings(program, findings);
   if (!mixer.ok()) return findings.Bad("daemon", Text(mixer.status()));
   const bool same = mixer->version() == CARILLON_VERSION;
   const std::string version = absl::StrCat("carillond ", mixer->version(), " at ", program.server);

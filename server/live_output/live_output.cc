@@ -14,6 +14,7 @@ constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
 /// Peak and loudness are sampled every kLevelPeriod. The peak is the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kLevelPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
+constexpr std::chrono::seconds kLossPeriod(1);
 /// A fade takes 50 ms and the latency of the device. A device that is stuck must not delay a stop.
 constexpr std::chrono::milliseconds kLongestFade(500);
 
@@ -52,7 +53,8 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
           [this](std::span<float> block) { RenderBlock(block); }, clock),
       final_fade_(settings.format),
       volume_{.gain = settings.gain},
-      loudness_(settings.format.sample_rate_hz, settings.format.channel_count) {}
+      loudness_(settings.format.sample_rate_hz, settings.format.channel_count),
+      loss_log_(settings.format.sample_rate_hz, log_) {}
 
 LiveOutput::~LiveOutput() {
   stopping_ = true;
@@ -123,6 +125,7 @@ void LiveOutput::FadeOut() {
 
 void LiveOutput::KeepHouse() {
   std::chrono::nanoseconds levels_due = clock_.Monotonic();
+  std::chrono::nanoseconds losses_due = levels_due + kLossPeriod;
   while (!stopping_) {
     broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
     stems_.Deliver();
@@ -130,6 +133,10 @@ void LiveOutput::KeepHouse() {
     if (clock_.Monotonic() >= levels_due) {
       NoteLevels();
       levels_due += kLevelPeriod;
+    }
+    if (const std::chrono::nanoseconds now = clock_.Monotonic(); now >= losses_due) {
+      NoteLosses();
+      losses_due = now + kLossPeriod;
     }
     clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
   }
@@ -142,6 +149,12 @@ void LiveOutput::NoteLevels() {
   while (peaks_.front().time < now - kPeakMemory) peaks_.pop_front();
   momentary_lufs_ = loudness_.momentary();
   short_term_lufs_ = loudness_.short_term();
+}
+
+void LiveOutput::NoteLosses() {
+  const DeviceState device = keeper_->state();
+  loss_log_.Note(look_ahead_.lost_frame_count() + device.lost_frame_count, clock_.Monotonic(),
+                 !device.message.empty());
 }
 
 }  // namespace carillon

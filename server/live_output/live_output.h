@@ -19,6 +19,7 @@
 #include "server/base/mutex.h"
 #include "server/live_output/device_keeper.h"
 #include "server/live_output/final_fade.h"
+#include "server/live_output/loss_log.h"
 #include "server/live_output/stems.h"
 #include "server/loudness/loudness_meter.h"
 #include "server/synthesis/mixer.h"
@@ -102,6 +103,7 @@ class LiveOutput {
   void RenderBlock(std::span<float> block);
   void KeepHouse();
   void NoteLevels();
+  void NoteLosses();
 
   const OutputSettings settings_;
   Clock& clock_;
@@ -122,6 +124,7 @@ class LiveOutput {
   std::optional<double> momentary_lufs_ ABSL_GUARDED_BY(mutex_);
   std::optional<double> short_term_lufs_ ABSL_GUARDED_BY(mutex_);
   LoudnessMeter loudness_;  ///< used only by the housekeeping thread
+  LossLog loss_log_;        ///< used only by the housekeeping thread
   std::atomic<bool> stopping_{false};
   std::thread housekeeper_;
 };

@@ -39,6 +39,7 @@ class LogIndex {
     header_ = nullptr;
     seen_log_.clear();
     seen_copies_.clear();
+    copied_salts_.clear();
   }
 
   /// Compares the header, after this process has got a lock of writers, with that of its last
@@ -51,6 +52,7 @@ class LogIndex {
     }
     if (Log() != seen_log_) log_.ForgetHead();
     if (Copies() != seen_copies_ || IsBeingCopied()) database_.ForgetHead();
+    copied_salts_ = IsCopied() ? Salts(Log()) : "";
     return HasHead(file);
   }
 
@@ -59,11 +61,12 @@ class LogIndex {
   void LeaveLog(sqlite3_file& file) {
     if (header_ == nullptr) return;
     seen_log_ = Log();
+    if (HasBegunAnew()) seen_copies_ = Copies();
     if (Copies() == seen_copies_) {
       HasHead(file);
       return;
     }
-    // This process has begun the log anew, or another one has copied it meanwhile.
+    // Another process has copied the log meanwhile.
     database_.TakeHead(file);
     seen_copies_ = Copies();
   }
@@ -121,6 +124,16 @@ class LogIndex {
   /// Whether a process copies the log into the database now, or was killed while it did.
   bool IsBeingCopied() const { return Copied() != BegunToCopy(); }
 
+  /// Whether the whole log was copied into the database.
+  bool IsCopied() const { return !IsBeingCopied() && Copied() == Log().substr(16, 4); }
+
+  /// Whether the change since Enter has begun the log anew, which it may if all of the log was in
+  /// the database, and nobody has begun to copy the new log.
+  bool HasBegunAnew() const {
+    return !copied_salts_.empty() && Salts(Log()) != copied_salts_ && !IsBeingCopied() &&
+           Copied() == std::string(4, '\0');
+  }
+
   static constexpr int kHeaderBytes = 132;
 
   MappingGuard& guard_;
@@ -129,6 +142,8 @@ class LogIndex {
   volatile char* header_ = nullptr;
   std::string seen_log_;
   std::string seen_copies_;
+  /// Salts of the log at the last Enter, if the whole log was in the database; else empty.
+  std::string copied_salts_;
 };
 
 /// A file of SQLite that is watched. SQLite's own file lies behind it in memory.

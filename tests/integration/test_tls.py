@@ -19,12 +19,12 @@ class TlsTest(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
-        self.certificate, key = self_signed(self.folder)
+        self.certificate, self.key = self_signed(self.folder)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.metrics = f"127.0.0.1:{free.getsockname()[1]}"
         self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--tls-certificate", self.certificate,
-                             "--tls-key", key, "--metrics", self.metrics)
+                             "--tls-key", self.key, "--metrics", self.metrics)
         self.addCleanup(self.daemon.stop)
         self.address = self.daemon.listening[1].split()[-1]
 
@@ -50,6 +50,23 @@ class TlsTest(unittest.TestCase):
         while "a certificate of the daemon expires in 1 days" not in (self.folder / "log").read_text():
             self.assertLess(time.monotonic(), end_s, (self.folder / "log").read_text())
             time.sleep(0.05)
+
+    def test_the_doctor_finds_files_with_which_the_daemon_would_not_start_again(self):
+        settings = r"(?m)^{} +settings +the daemon {}"
+        good = self.daemon.command("doctor", check=False).stdout
+        self.assertRegex(good, settings.format("ok", "would start again with the files as they are$"))
+        whole = self.key.read_bytes()
+        for name, harm in (("truncated", lambda: self.key.write_bytes(whole[:100])),
+                           ("open to all", lambda: self.key.chmod(0o666)),
+                           ("removed", self.key.unlink)):
+            with self.subTest(name=name):
+                harm()
+                done = self.daemon.command("doctor", check=False)
+                self.assertEqual(done.returncode, 1)
+                self.assertRegex(done.stdout, settings.format(
+                    "FAULT", f"runs, but would not start again: TLS_UNUSABLE: .*{self.key.name}"))
+                self.key.write_bytes(whole)
+                self.key.chmod(0o600)
 
     def test_without_roots_it_says_that_the_daemon_may_want_tls(self):
         done = self.status()

@@ -158,6 +158,7 @@ class DeviceLifeTest(unittest.TestCase):
             self.daemon.process.send_signal(signal.SIGCONT)
             wait_until(self.plays, BACK_S)
             self.assert_sounds(server)
+        wait_until(lambda: "the sound has gaps: " in (self.folder / "log").read_text(), NOTICED_S)
         self.stop_in_time()
 
     def test_a_file_on_a_full_disk_is_continued_when_there_is_space(self):

@@ -112,12 +112,22 @@ TEST_F(WriteWatchTest, NoChangeIsAcknowledgedAfterTheBeginningOfTheFileWasOverwr
 }
 
 TEST_F(WriteWatchTest, AChangeDuringWhichTheFileWasOverwrittenIsNotAcknowledged) {
-  ASSERT_TRUE(StoreLittle(*database_).ok());  // begins the log anew
-  const absl::Status status = database_->Write([&](SqliteConnection& connection) {
-    Overwrite(file_, std::string(100, '\0'));
-    return connection.Run("INSERT INTO rows VALUES ('')");
-  });
-  EXPECT_THAT(status.ToString(), HasSubstr("DATABASE_LOST: "));
+  const std::string before = ReadBytes(file_);
+  for (const bool begins_the_log_anew : {true, false}) {
+    Open();
+    if (!begins_the_log_anew) {
+      ASSERT_TRUE(StoreLittle(*database_).ok());
+    }
+    const absl::Status status = database_->Write([&](SqliteConnection& connection) {
+      Overwrite(file_, std::string(100, '\0'));
+      return connection.Run("INSERT INTO rows VALUES ('')");
+    });
+    EXPECT_THAT(status.ToString(), HasSubstr("DATABASE_LOST: ")) << begins_the_log_anew;
+    database_.reset();
+    std::filesystem::remove(log_);
+    std::ofstream(file_, std::ios::binary) << before;
+    LossMark(file_).Remove();
+  }
 }
 
 TEST_F(WriteWatchTest, AFileThatIsOverwrittenAfterACrashIsLost) {
