@@ -247,8 +247,8 @@ void CheckSettings(const Program& program, Findings& findings) {
   } else if (checked->ok()) {
     findings.Good("settings", "the daemon would start again with the files as they are");
   } else {
-    findings.Bad("settings", absl::StrCat("the daemon runs, but would not start again: ",
-                                          Text(*checked)));
+    findings.Bad("settings",
+                 absl::StrCat("the daemon runs, but would not start again: ", Text(*checked)));
   }
 }
 
