@@ -13,6 +13,14 @@ class SpscQueue {
  public:
   explicit SpscQueue(size_t capacity) : queue_(capacity) {}
 
+  /// Writes to all memory of a queue that nobody uses yet. The system would otherwise give the
+  /// queue its pages one by one while its places are used for the first time.
+  void TouchMemory() {
+    while (queue_.push(T())) {
+    }
+    queue_.reset();
+  }
+
   /// Appends a value. Returns false, without taking `value`, if the queue is full. Only the
   /// producer may call it.
   bool TryPush(const T& value) noexcept { return queue_.push(value); }

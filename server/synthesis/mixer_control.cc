@@ -69,6 +69,9 @@ Mixer::Mixer(const MixerSettings& settings)
   assert(settings.most_banks <= RenderOrder::kMostSlots);
   assert(settings.most_pending_events <= RenderOrder::kMostArrivals);
   assert(settings.most_buses > 0 && settings.most_buses <= kMostBuses);
+  // The rendering thread must not wait for pages.
+  commands_.TouchMemory();
+  retired_.TouchMemory();
   statistics_.frame_count = settings.first_frame;
   owned_buses_[0].open = true;
   const size_t thread_count = settings.threads == nullptr ? 1 : settings.threads->size();
