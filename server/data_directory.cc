@@ -56,6 +56,21 @@ bool IsOfKernel(const std::filesystem::path& path) {
          (found.f_type == PROC_SUPER_MAGIC || found.f_type == SYSFS_MAGIC);
 }
 
+/// Checks that this user may change the files that are there.
+absl::Status CheckFiles(const std::filesystem::path& folder) {
+  for (const char* name : {"lock", "carillon.db", "carillon.db-wal", "carillon.db-shm"}) {
+    const std::filesystem::path file = folder / name;
+    if (faccessat(AT_FDCWD, file.c_str(), R_OK | W_OK, AT_EACCESS) == 0 || errno == ENOENT) {
+      continue;
+    }
+    return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
+                   absl::StrCat("\"", file.string(),
+                                "\" cannot be used: ", std::generic_category().message(errno),
+                                "; see that this user may read and write it"));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status DataDirectory::Check(const std::filesystem::path& path) {
@@ -69,7 +84,7 @@ absl::Status DataDirectory::Check(const std::filesystem::path& path) {
   if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
     return Unusable(path, errno);
   }
-  return IsOfKernel(folder) ? Unusable(path, EROFS) : absl::OkStatus();
+  return IsOfKernel(folder) ? Unusable(path, EROFS) : CheckFiles(path);
 }
 
 absl::StatusOr<DataDirectory> DataDirectory::Open(const std::filesystem::path& path) {

@@ -22,6 +22,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/api_server.h"
 #include "server/api/client_limits.h"
@@ -33,6 +34,7 @@
 #include "server/decomposition/local_executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_executor.h"
+#include "server/decomposition/work_folder.h"
 #include "server/free_memory.h"
 #include "server/live_output/live_output.h"
 #include "server/memory_limits.h"
@@ -173,9 +175,11 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
   sd_notify(0, "READY=1");
 }
 
-/// Whether the program that computes decompositions is there; a cluster has its own.
-bool CanDecompose(const Options& options) {
-  return options.executor != "local" || access(options.precompute_program.c_str(), X_OK) == 0;
+/// Checks that decompositions can run, as far as this machine decides it.
+absl::Status CheckDecomposition(const Options& options) {
+  if (options.executor != "local") return absl::OkStatus();
+  RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
+  return CheckWorkFolder(DataDirectory::WorkDirectory(options.data_directory));
 }
 
 /// Null if no metrics are wanted.
@@ -230,8 +234,8 @@ absl::Status Run(Options options, const ReadOptions& read_options, const StopGua
                                                              .log = LogWarning,
                                                              .log_error = LogError,
                                                              .log_event = LogEvent,
-                                                             .can_decompose = [options] {
-                                                               return CanDecompose(options);
+                                                             .check_decomposition = [options] {
+                                                               return CheckDecomposition(options);
                                                              }}));
   return Serve({.version = kVersion,
                 .output = *output,
@@ -277,23 +281,23 @@ absl::Status Report(const std::filesystem::path& file, const std::filesystem::pa
 
 /// Logs an error, and returns the exit status that belongs to it.
 int Fail(const absl::Status& status, int exit_status) {
-  spdlog::error("{}", std::string(status.message()));
+  spdlog::error("{}", EscapedText(std::string(status.message())));
   return exit_status;
 }
 
 /// Runs the daemon until it is stopped. Returns the exit status.
-int RunDaemon(const Options& options, const ReadOptions& read_options) {
+int RunDaemon(const CommandLine& command, const ReadOptions& read_options) {
   BlockSignals();
   ApiServer::KeepLibrary();
   const StopGuard guard(LogInfo);
-  if (const absl::Status wrong = CheckRooms(options); !wrong.ok()) return Fail(wrong, kWrongUsage);
-  const absl::Status status = Run(options, read_options, guard);
+  if (const absl::Status wrong = CheckRooms(command); !wrong.ok()) return Fail(wrong, kWrongUsage);
+  const absl::Status status = Run(command.options, read_options, guard);
   return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
 }
 
 /// Checks the settings without running the daemon. Returns the exit status.
-int CheckOnly(const Options& options) {
-  if (const absl::Status wrong = CheckRooms(options); !wrong.ok()) return Fail(wrong, kWrongUsage);
+int CheckOnly(const CommandLine& command) {
+  if (const absl::Status wrong = CheckRooms(command); !wrong.ok()) return Fail(wrong, kWrongUsage);
   std::cout << "the configuration is valid" << std::endl;
   return EXIT_SUCCESS;
 }
@@ -344,8 +348,8 @@ int Main(int argc, const char* const* argv) {
     return EXIT_SUCCESS;
   }
   SetLogLevel(command->options.log_level);
-  if (command->only_check) return CheckOnly(command->options);
-  if (command->database_command.empty()) return RunDaemon(command->options, read_options);
+  if (command->only_check) return CheckOnly(*command);
+  if (command->database_command.empty()) return RunDaemon(*command, read_options);
   const absl::Status status = RunDatabaseCommand(*command);
   return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
 }

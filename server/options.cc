@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 #include <system_error>
 #include <type_traits>
 
@@ -20,6 +19,7 @@
 #include "proto/cpp/server_address.h"
 #include "proto/cpp/status_macros.h"
 #include "server/setting_rules.h"
+#include "server/visit_settings.h"
 
 namespace carillon {
 namespace {
@@ -64,45 +64,6 @@ Options Defaults() {
   options.audio_program = Beside("carillon-audio");
   options.slurm_client = Beside("carillon");
   return options;
-}
-
-/// Calls visit(key, setting) for each setting of the configuration file.
-template <typename SomeOptions, typename Visit>
-void VisitSettings(SomeOptions& options, const Visit& visit) {
-  visit("listen", options.addresses);
-  visit("data_dir", options.data_directory);
-  visit("access_file", options.access_file);
-  visit("tls_certificate", options.tls_certificate_file);
-  visit("tls_key", options.tls_key_file);
-  visit("tls_client_roots", options.tls_client_roots_file);
-  visit("audio_device", options.audio_device);
-  visit("audio_program", options.audio_program);
-  visit("sample_rate", options.sample_rate_hz);
-  visit("channels", options.channel_count);
-  visit("gain", options.gain);
-  visit("full_scale_pa", options.full_scale_pa);
-  visit("head", options.head_file);
-  visit("block_frames", options.block_frame_count);
-  visit("look_ahead_blocks", options.look_ahead_block_count);
-  visit("scene_grace", options.scene_grace_s);
-  visit("client_share", options.client_share);
-  visit("metrics", options.metrics_address);
-  visit("log_level", options.log_level);
-  visit("workers", options.worker_count);
-  visit("memory_budget_mib", options.memory_budget_mib);
-  visit("job_memory_mib", options.job_memory_mib);
-  visit("job_time", options.job_time_s);
-  visit("stall_time", options.stall_time_s);
-  visit("queue_limit", options.queue_limit);
-  visit("transfers", options.transfers);
-  visit("model_budget_mib", options.model_budget_mib);
-  visit("precompute", options.precompute_program);
-  visit("executor", options.executor);
-  visit("slurm_dir", options.slurm_directory);
-  visit("slurm_partition", options.slurm_partition);
-  visit("slurm_upload", options.slurm_upload);
-  visit("slurm_client", options.slurm_client);
-  visit("slurm_tls_roots", options.slurm_tls_roots);
 }
 
 /// Returns how a value of type T is written in the configuration file.
@@ -163,23 +124,27 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   return status;
 }
 
-/// Returns a mistake in a file. `line` is zero if the mistake is not in one line.
-absl::Status MistakeIn(const std::string& path, uint32_t line, absl::string_view what) {
-  const std::string place = line == 0 ? path : absl::StrCat(path, " line ", line);
+/// Returns a line of a file as text for people. `line` is zero if the whole file is meant.
+std::string PlaceIn(const std::string& path, uint32_t line) {
+  return line == 0 ? path : absl::StrCat(path, " line ", line);
+}
+
+absl::Status MistakeAt(const std::string& place, absl::string_view what) {
   return InvalidConfiguration(absl::StrCat(place, ": ", what));
 }
 
-absl::Status ReadFile(const std::string& path, Options& options) {
+absl::Status ReadFile(const std::string& path, Options& options, SettingPlaces& places) {
   RETURN_IF_ERROR(CheckIsFile(path));
   try {
     const toml::table table = toml::parse_file(path);
     for (const auto& [key, node] : table) {
+      const std::string place = PlaceIn(path, key.source().begin.line);
       const absl::Status status = ReadKey(std::string(key.str()), node, options);
-      if (status.ok()) continue;
-      return MistakeIn(path, key.source().begin.line, ToErrorInfo(status).message());
+      if (!status.ok()) return MistakeAt(place, ToErrorInfo(status).message());
+      places.emplace(key.str(), place);
     }
   } catch (const toml::parse_error& error) {
-    return MistakeIn(path, error.source().begin.line,
+    return MistakeAt(PlaceIn(path, error.source().begin.line),
                      {error.description().data(), error.description().size()});
   }
   return absl::OkStatus();
@@ -342,52 +307,26 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
   RETURN_IF_ERROR(CheckValues(argc, argv));
   CommandLine command{.options = Defaults()};
   std::string configuration = DefaultConfiguration();
+  Options of_file = command.options;
   // The flags are parsed twice: for the name of the file, and to override the file's settings.
   for (const bool with_file : {false, true}) {
     if (with_file) {
       if (configuration.empty()) break;
-      command.options = Defaults();
-      RETURN_IF_ERROR(ReadFile(configuration, command.options));
+      of_file = Defaults();
+      RETURN_IF_ERROR(ReadFile(configuration, of_file, command.places));
+      command.options = of_file;
     }
     if (const auto exit_status = ParseFlags(argc, argv, version, configuration, command)) {
       command.exit_status = *exit_status;
       return command;
     }
   }
+  for (const std::string& name : DifferentSettings(of_file, command.options)) {
+    command.places.erase(name);
+  }
   RETURN_IF_ERROR(Check(command.options));
   command.run = true;
   return command;
-}
-
-std::vector<std::string> DifferentSettings(const Options& first, const Options& second) {
-  std::vector<std::string> names;
-  VisitSettings(first, [&](absl::string_view name, const auto& one) {
-    VisitSettings(second, [&](absl::string_view other_name, const auto& other) {
-      if constexpr (std::is_same_v<decltype(one), decltype(other)>) {
-        if (name == other_name && one != other) names.emplace_back(name);
-      }
-    });
-  });
-  return names;
-}
-
-std::string PrintConfiguration(const Options& options) {
-  std::ostringstream text;
-  VisitSettings(options, [&text](const char* key, const auto& setting) {
-    using Setting = std::decay_t<decltype(setting)>;
-    toml::table line;
-    if constexpr (std::is_same_v<Setting, std::vector<std::string>>) {
-      toml::array array;
-      for (const std::string& element : setting) array.push_back(element);
-      line.insert(key, std::move(array));
-    } else if constexpr (std::is_integral_v<Setting> && !std::is_same_v<Setting, bool>) {
-      line.insert(key, static_cast<int64_t>(setting));
-    } else {
-      line.insert(key, setting);
-    }
-    text << line << "\n";
-  });
-  return text.str();
 }
 
 }  // namespace carillon

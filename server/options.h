@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -55,9 +56,14 @@ struct Options {
 /// Exit status after an error in the command line or in the configuration file.
 inline constexpr int kWrongUsage = 2;
 
+/// For each setting that the configuration file gives and no flag overrides, its file and line as
+/// text for people, by the name of the setting in the file.
+using SettingPlaces = std::map<std::string, std::string>;
+
 /// The parsed command line, which decides the program's next action.
 struct CommandLine {
   Options options;
+  SettingPlaces places{};
   bool run = false;  ///< if false, end with exit_status (after --help, --version or a wrong flag)
   /// "check", "repair" or "restore" if the program is to do this to the database, which no daemon
   /// may have open. If empty, the program serves.

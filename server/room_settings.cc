@@ -3,7 +3,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/open_device.h"
 #include "server/metrics/metrics_address.h"
@@ -13,6 +16,22 @@ namespace {
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+}
+
+/// Returns the setting that is at fault when the API refuses its settings for a reason.
+std::string ApiSetting(const std::string& reason) {
+  if (reason == "ACCESS_FILE_UNUSABLE") return "access_file";
+  if (reason == "HEAD_UNUSABLE") return "head";
+  return reason == "TLS_UNUSABLE" ? "tls_certificate" : "listen";
+}
+
+/// Returns the same refusal of a setting with its place in the configuration file.
+absl::Status At(const SettingPlaces& places, const std::string& setting,
+                const absl::Status& status) {
+  const auto place = places.find(setting);
+  if (status.ok() || place == places.end()) return status;
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  return Refusal(status.code(), error.reason(), absl::StrCat(place->second, ": ", error.message()));
 }
 
 }  // namespace
@@ -50,20 +69,24 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .version = CARILLON_VERSION,
           .scene_grace_s = options.scene_grace_s,
           .client_share = options.client_share,
-          .precompute_program = options.precompute_program,
           .slurm = options.executor == "slurm"};
 }
 
-absl::Status CheckRooms(const Options& options) {
-  RETURN_IF_ERROR(DataDirectory::Check(options.data_directory));
+absl::Status CheckRooms(const CommandLine& command) {
+  const Options& options = command.options;
+  const auto at = [&](const std::string& setting, const absl::Status& status) {
+    return At(command.places, setting, status);
+  };
+  RETURN_IF_ERROR(at("data_dir", DataDirectory::Check(options.data_directory)));
   if (options.executor == "local") {
-    RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
+    RETURN_IF_ERROR(at("precompute", CheckLocalExecutor(LocalExecutorOptionsOf(options))));
   }
-  RETURN_IF_ERROR(CheckDevice(options.audio_device));
+  RETURN_IF_ERROR(at("audio_device", CheckDevice(options.audio_device)));
   if (!options.metrics_address.empty()) {
-    RETURN_IF_ERROR(CheckMetricsAddress(options.metrics_address));
+    RETURN_IF_ERROR(at("metrics", CheckMetricsAddress(options.metrics_address)));
   }
-  return ApiServer::Check(ApiSettingsOf(options), options.sample_rate_hz);
+  const absl::Status api = ApiServer::Check(ApiSettingsOf(options), options.sample_rate_hz);
+  return at(ApiSetting(ToErrorInfo(api).reason()), api);
 }
 
 }  // namespace carillon

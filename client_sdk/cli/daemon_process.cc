@@ -64,6 +64,13 @@ std::string Read(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+/// Returns the texts in a file of /proc that ends each with a zero byte.
+std::vector<std::string> ReadWords(pid_t process, const char* name) {
+  const std::string words = Read(absl::StrCat("/proc/", process, "/", name));
+  if (words.empty()) return {};
+  return absl::StrSplit(absl::StripSuffix(words, absl::string_view("\0", 1)), '\0');
+}
+
 /// The scheduling policy in a thread's line of /proc; see proc(5).
 std::optional<int> PolicyIn(const std::string& stat) {
   constexpr size_t kPolicyAfterName = 39;
@@ -105,10 +112,26 @@ std::string ProgramOf(pid_t process) {
   return std::string(absl::StripSuffix(name, "\n"));
 }
 
-std::vector<std::string> ArgumentsOf(pid_t process) {
-  const std::string words = Read(absl::StrCat("/proc/", process, "/cmdline"));
-  if (words.empty()) return {};
-  return absl::StrSplit(absl::StripSuffix(words, absl::string_view("\0", 1)), '\0');
+std::vector<std::string> ArgumentsOf(pid_t process) { return ReadWords(process, "cmdline"); }
+
+std::vector<std::string> EnvironmentOf(pid_t process) { return ReadWords(process, "environ"); }
+
+std::optional<ProcessOwner> OwnerOf(pid_t process) {
+  ProcessOwner owner;
+  int found_count = 0;
+  for (const absl::string_view line :
+       absl::StrSplit(Read(absl::StrCat("/proc/", process, "/status")), '\n')) {
+    std::vector<std::string> words =
+        absl::StrSplit(line, absl::ByAnyChar("\t "), absl::SkipEmpty());
+    if (words.empty()) continue;
+    // The second number is the effective one, which decides about files.
+    if (words[0] == "Uid:")
+      found_count += words.size() > 2 && absl::SimpleAtoi(words[2], &owner.user);
+    if (words[0] == "Gid:")
+      found_count += words.size() > 2 && absl::SimpleAtoi(words[2], &owner.group);
+    if (words[0] == "Groups:") owner.other_groups.assign(words.begin() + 1, words.end());
+  }
+  return found_count == 2 ? std::optional(owner) : std::nullopt;
 }
 
 bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {

@@ -28,6 +28,20 @@ std::string ProgramOf(pid_t process);
 /// are none if this user cannot see them.
 std::vector<std::string> ArgumentsOf(pid_t process);
 
+/// Returns the variables that the process was started with, as NAME=VALUE. They are none if this
+/// user cannot see them.
+std::vector<std::string> EnvironmentOf(pid_t process);
+
+/// The numbers of a process's user and groups.
+struct ProcessOwner {
+  uid_t user = 0;
+  gid_t group = 0;
+  std::vector<std::string> other_groups{};
+};
+
+/// Returns the owner of a process, or nothing if the process is gone.
+std::optional<ProcessOwner> OwnerOf(pid_t process);
+
 /// Returns whether the process at a Unix socket takes no connection, or sends nothing on one within
 /// the time. A daemon sends its HTTP/2 settings at once. If no process listens there, the result is
 /// false.

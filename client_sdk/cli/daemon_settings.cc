@@ -1,19 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/daemon_settings.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/escaped_text.h"
 
 namespace carillon::cli {
 namespace {
@@ -23,50 +31,87 @@ constexpr char kLongestS[] = "10";
 /// The exit status of carillond, if its settings are wrong.
 constexpr int kWrongSettings = 2;
 constexpr size_t kLongestOutput = 64 << 10;
+/// The variables that decide about the settings of carillond, and none that could load a library.
+constexpr auto kVariables =
+    std::to_array<absl::string_view>({"CONFIGURATION_DIRECTORY=", "HOME=", "RUNTIME_DIRECTORY=",
+                                      "STATE_DIRECTORY=", "XDG_RUNTIME_DIR=", "XDG_STATE_HOME="});
 
-/// Returns the words before a program that let it run as `user`, or nothing if this user may not do
-/// that. The program of a daemon must not run with the rights or the environment of root.
-std::optional<std::vector<std::string>> WordsToRunAs(uid_t user) {
-  std::vector<std::string> words = {"timeout", kLongestS};
-  if (user == geteuid()) return words;
-  if (geteuid() != 0) return std::nullopt;
-  for (const std::string& word :
-       {std::string("setpriv"), absl::StrCat("--reuid=", user), std::string("--init-groups"),
-        std::string("--reset-env"), std::string("--no-new-privs")}) {
-    words.push_back(word);
-  }
-  return words;
+using Words = std::vector<std::string>;
+
+void Append(Words& words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
 }
 
-/// Returns the message of the last error that carillond has printed.
-std::string LastError(const std::string& output) {
+/// Returns the words before a program that let it run with the user and the groups of a daemon, or
+/// nothing if this user may not do that. A daemon's program must not run with the rights of root.
+std::optional<Words> WordsToRunAs(const ProcessOwner& owner) {
+  if (owner.user == geteuid()) return Words();
+  if (geteuid() != 0) return std::nullopt;
+  return Words{"setpriv", absl::StrCat("--reuid=", owner.user),
+               absl::StrCat("--regid=", owner.group),
+               owner.other_groups.empty()
+                   ? "--clear-groups"
+                   : absl::StrCat("--groups=", absl::StrJoin(owner.other_groups, ",")),
+               "--no-new-privs"};
+}
+
+/// Returns the program of a process, which may have been replaced by an upgrade, or nothing if it
+/// is gone.
+std::optional<std::string> ProgramFileOf(const std::string& folder) {
+  std::error_code error;
+  const std::string path = std::filesystem::read_symlink(folder + "/exe", error);
+  if (error) return std::nullopt;
+  const bool is_gone = absl::EndsWith(path, " (deleted)");
+  if (!is_gone) return folder + "/exe";
+  const std::string now(absl::StripSuffix(path, " (deleted)"));
+  return std::filesystem::exists(now, error) ? std::optional(now) : std::nullopt;
+}
+
+/// Returns the message of the error that carillond has printed.
+std::string MessageIn(const std::string& output) {
   const std::pair<std::string, std::string> parts =
       absl::StrSplit(output, absl::MaxSplits(" error: ", 1));
-  return std::string(absl::StripAsciiWhitespace(parts.second.empty() ? output : parts.second));
+  return EscapedText(
+      std::string(absl::StripAsciiWhitespace(parts.second.empty() ? output : parts.second)));
+}
+
+/// Runs a check of the settings.
+std::optional<absl::Status> Run(const Words& words, const std::string& folder) {
+  absl::StatusOr<Pipe> errors = Pipe::Make();
+  if (!errors.ok()) return std::nullopt;
+  absl::StatusOr<ChildProcess> check =
+      ChildProcess::Start({.words = words, .errors = errors->write_end(), .folder = folder});
+  if (!check.ok()) return std::nullopt;
+  errors->CloseWriteEnd();
+  const std::string output = errors->Read(kLongestOutput);
+  const ProcessEnd end = check->Wait();
+  if (end.exited && end.status == 0) return absl::OkStatus();
+  if (!end.exited || end.status != kWrongSettings) return std::nullopt;
+  return absl::FailedPreconditionError(MessageIn(output));
 }
 
 }  // namespace
 
 std::optional<absl::Status> CheckSettingsOf(pid_t process) {
   const std::string folder = absl::StrCat("/proc/", process);
-  struct stat owner {};
-  if (ProgramOf(process) != "carillond" || stat(folder.c_str(), &owner) != 0) return std::nullopt;
-  auto words = WordsToRunAs(owner.st_uid);
-  const std::vector<std::string> arguments = ArgumentsOf(process);
-  absl::StatusOr<Pipe> errors = Pipe::Make();
-  if (!words || arguments.empty() || !errors.ok()) return std::nullopt;
-  words->push_back(folder + "/exe");
-  words->insert(words->end(), arguments.begin() + 1, arguments.end());
-  words->push_back("--check-config");
-  absl::StatusOr<ChildProcess> check = ChildProcess::Start(
-      {.words = *words, .errors = errors->write_end(), .folder = folder + "/cwd"});
-  if (!check.ok()) return std::nullopt;
-  errors->CloseWriteEnd();
-  const std::string output = errors->Read(kLongestOutput);
-  const ProcessEnd end = check->Wait();
-  if (!end.exited || (end.status != 0 && end.status != kWrongSettings)) return std::nullopt;
-  if (end.status == 0) return absl::OkStatus();
-  return absl::FailedPreconditionError(LastError(output));
+  const std::optional<ProcessOwner> owner = OwnerOf(process);
+  const Words arguments = ArgumentsOf(process);
+  if (ProgramOf(process) != "carillond" || !owner || arguments.empty()) return std::nullopt;
+  const std::optional<Words> as_owner = WordsToRunAs(*owner);
+  if (!as_owner) return std::nullopt;
+  const std::optional<std::string> program = ProgramFileOf(folder);
+  if (!program) return absl::FailedPreconditionError("its program is gone: install it again");
+  Words words = {"timeout", kLongestS};
+  Append(words, *as_owner);
+  Append(words, {"env", "-i"});
+  for (const std::string& variable : EnvironmentOf(process)) {
+    const auto begins = [&](absl::string_view name) { return absl::StartsWith(variable, name); };
+    if (std::ranges::any_of(kVariables, begins)) words.push_back(variable);
+  }
+  words.push_back(*program);
+  Append(words, {arguments.begin() + 1, arguments.end()});
+  words.push_back("--check-config");
+  return Run(words, folder + "/cwd");
 }
 
 }  // namespace carillon::cli

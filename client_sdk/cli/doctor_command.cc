@@ -162,9 +162,12 @@ void CheckWorkers(const Health& health, Findings& findings) {
         "workers",
         absl::StrCat("carillon.v1.DecompositionService is NOT_SERVING, because ",
                      health.models
-                         ? "the daemon cannot execute its carillon-precompute: put that program "
-                           "back, or give the path of another with --precompute and restart the "
-                           "daemon (`carillond --print-config` prints the path in force)"
+                         ? "the daemon cannot execute its carillon-precompute, or cannot use the "
+                           "folder work in its data folder; decompositions_impossible in the "
+                           "daemon's log says which. Put that program back, or give the path of "
+                           "another with --precompute and restart the daemon (`carillond "
+                           "--print-config` prints the path in force); or remove what is in place "
+                           "of the folder, or free space"
                          : "a model has no place in the database: see the database above"));
   }
   const std::filesystem::path beside =
@@ -233,19 +236,20 @@ void CheckCertificates(const client::Client& daemon, Findings& findings) {
                             "reload the daemon (systemctl reload carillond)"));
 }
 
-/// Finds nothing about the settings of a daemon that runs elsewhere or in a container.
+/// Finds nothing about the settings of a daemon that is reached over TCP.
 void CheckSettings(const Program& program, Findings& findings) {
   absl::string_view path = program.server;
   if (!absl::ConsumePrefix(&path, "unix:")) return;
   const absl::StatusOr<pid_t> process = ProcessAt(std::string(path));
-  if (!process.ok() || *process == 0) return;
-  const std::optional<absl::Status> checked = CheckSettingsOf(*process);
+  if (!process.ok()) return;
+  // The number is zero for a process in another PID namespace.
+  const auto checked = *process == 0 ? std::nullopt : CheckSettingsOf(*process);
   if (!checked) {
     findings.Unknown("settings",
-                     "run this as root or as the user of the daemon to have its settings, and the "
-                     "files that they name, checked as at a start");
+                     "run this as root or as the daemon's user, and where the daemon runs, to have "
+                     "its settings and the files that they name checked as at a start");
   } else if (checked->ok()) {
-    findings.Good("settings", "the daemon would start again with the files as they are");
+    findings.Good("settings", "a start would accept the settings and the files that they name");
   } else {
     findings.Bad("settings",
                  absl::StrCat("the daemon runs, but would not start again: ", Text(*checked)));

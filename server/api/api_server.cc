@@ -170,14 +170,13 @@ struct ApiServer::State {
                      .certificate_end = certificate_end,
                      .binaural = heads.available(),
                      .slurm = settings.slurm,
-                     .can_decompose = rooms.can_decompose},
+                     .can_decompose = [this] { return decomposes.load(); }},
                     rooms.decompositions, rooms.output, rooms.clock),
         output(rooms.output),
         log(rooms.log),
         log_error(rooms.log_error),
         log_event(rooms.log_event),
-        precompute_program(settings.precompute_program),
-        can_decompose(rooms.can_decompose) {}
+        check_decomposition(rooms.check_decomposition) {}
 
   absl::Status Listen(const ApiSettings& settings);
   /// Begins to accept connections, and to look after the clients and the database.
@@ -195,7 +194,7 @@ struct ApiServer::State {
 
   /// Sets the health of DecompositionService when decompositions have become possible or
   /// impossible.
-  void ShowWorkers(bool can);
+  void ShowWorkers(const absl::Status& state);
 
   /// Sets the health of ModalModelService and DecompositionService, and logs why the database
   /// cannot be changed, or that it can be changed again.
@@ -240,8 +239,7 @@ struct ApiServer::State {
   const std::function<void(const std::string& line)> log;
   const std::function<void(const std::string& line)> log_error;
   const EventSink log_event;
-  const std::string precompute_program;
-  const std::function<bool()> can_decompose;
+  const std::function<absl::Status()> check_decomposition;
   /// The credentials of each TCP address.
   std::vector<std::shared_ptr<TlsCredentials>> tls;
   std::optional<GrpcServers> servers;
@@ -306,16 +304,20 @@ void ApiServer::State::Open() {
 
 void ApiServer::State::KeepClients() {
   client_keeper.Look();
-  ShowWorkers(can_decompose());
+  ShowWorkers(check_decomposition());
   if (const auto warning = certificate_end.WarningDue()) log(*warning);
 }
 
-void ApiServer::State::ShowWorkers(bool can) {
+void ApiServer::State::ShowWorkers(const absl::Status& state) {
+  const bool can = state.ok();
   if (decomposes.exchange(can) == can) return;
   servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
-  log_event(Event(can ? "decompositions_possible" : "decompositions_impossible",
-                  can ? LogLevel::kInfo : LogLevel::kWarning)
-                .With("program", precompute_program));
+  if (can) {
+    log_event(Event("decompositions_possible", LogLevel::kInfo));
+  } else {
+    log_event(Event("decompositions_impossible", LogLevel::kWarning)
+                  .With("error", std::string(state.message())));
+  }
 }
 
 void ApiServer::State::ShowDatabase(const absl::Status& state) {

@@ -42,8 +42,6 @@ struct ApiSettings {
   double client_share = 0.5;
   /// Seconds after which a rendering ends if its client neither sends nor reads.
   double rendering_idle_s = 60;
-  /// Path of the program that computes decompositions, for the log.
-  std::string precompute_program{};
   /// Whether decompositions run on the cluster that Slurm manages.
   bool slurm = false;
 };
@@ -61,7 +59,7 @@ struct ServedRooms {
   std::function<void(const std::string& line)> log_error = [](const std::string&) {};
   EventSink log_event = [](const Event&) {};  ///< takes what calls have done
   /// Returns whether decompositions can run. Called several times a second.
-  std::function<bool()> can_decompose = [] { return true; };
+  std::function<absl::Status()> check_decomposition = [] { return absl::OkStatus(); };
 };
 
 /// The numbers of scenes, streams, listeners and renderings that clients hold at one moment.

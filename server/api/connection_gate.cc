@@ -243,7 +243,12 @@ bool ConnectionGate::Admit(const std::string& peer, const Connection& connection
     const auto refused = refused_.find(source);
     if (refused != refused_.end() && Now() < refused->second) return false;
     reason = WhyNoPlace(source);
-    if (!reason.empty() && ForgetClosed()) reason = WhyNoPlace(source);
+    // The memory of closed connections must not grow with the number of clients that ever came.
+    const bool is_long = connections_.size() >= most_remembered_;
+    if ((is_long || !reason.empty()) && ForgetClosed()) {
+      reason = WhyNoPlace(source);
+      most_remembered_ = 2 * connections_.size() + kFewConnections;
+    }
     if (reason.empty() && connections_.insert_or_assign(peer, connection).second) ++counts_[source];
   }
   if (!reason.empty()) Tell(source, reason);

@@ -156,6 +156,8 @@ class ConnectionGate {
   mutable Mutex mutex_;
   /// Connections by peer. Some of them may have been closed.
   std::map<std::string, Connection> connections_ ABSL_GUARDED_BY(mutex_);
+  /// When connections_ has this size, the closed ones are removed from it.
+  size_t most_remembered_ ABSL_GUARDED_BY(mutex_) = 64;
   /// Number of these connections of each process or address.
   std::map<std::string, size_t> counts_ ABSL_GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point next_forgetting_ ABSL_GUARDED_BY(mutex_);

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/audio_device/open_device.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -28,6 +32,21 @@ bool HoldsOther(const std::string& path) {
   std::string begin(4, '\0');
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   return file.gcount() > 0 && begin != "RIFF" && begin != "RF64";
+}
+
+/// Checks that this user may write to a file, or make it.
+absl::Status CheckMayWrite(const std::string& path) {
+  std::error_code ignored;
+  const bool exists = std::filesystem::exists(path, ignored);
+  const std::string changed =
+      exists ? path : std::filesystem::absolute(path, ignored).parent_path().string();
+  int error = std::filesystem::is_directory(path, ignored) ? EISDIR : 0;
+  if (error == 0 && faccessat(AT_FDCWD, changed.c_str(), W_OK, AT_EACCESS) != 0) error = errno;
+  if (error == 0) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kFailedPrecondition, "AUDIO_FILE_FAILED",
+      absl::StrCat("cannot write \"", path, "\": ", std::generic_category().message(error),
+                   "; name a file in a folder that exists and may be written"));
 }
 
 absl::StatusOr<std::unique_ptr<AudioDevice>> OpenFileDevice(absl::string_view path,
@@ -60,7 +79,7 @@ absl::Status CheckDevice(absl::string_view specification) {
                      "\" names no audio device; say auto, portaudio, portaudio:NAME, null "
                      "or file:PATH"));
   }
-  if (!HoldsOther(std::string(rest))) return absl::OkStatus();
+  if (!HoldsOther(std::string(rest))) return CheckMayWrite(std::string(rest));
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
                  absl::StrCat("\"", rest,
                               "\" holds something other than a WAV sound, and stays as it is: "

@@ -27,6 +27,7 @@
 #include "server/base/mutex.h"
 #include "server/base/physical_memory.h"
 #include "server/decomposition/local_worker.h"
+#include "server/decomposition/work_folder.h"
 
 namespace carillon {
 namespace {
@@ -250,20 +251,6 @@ class LocalExecutor final : public Executor {
   std::thread thread_;
 };
 
-// Makes the directory empty and readable by this user only.
-absl::Status PrepareDirectory(const std::filesystem::path& directory) {
-  std::error_code error;
-  std::filesystem::remove_all(directory, error);
-  if (!error) std::filesystem::create_directories(directory, error);
-  if (!error) {
-    std::filesystem::permissions(directory, std::filesystem::perms::owner_all, error);
-  }
-  if (!error) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat("the folder ", directory.string(), " cannot be made (",
-                              error.message(), "): name one that this user may write"));
-}
-
 }  // namespace
 
 absl::Status CheckLocalExecutor(const LocalExecutorOptions& options) {
@@ -276,7 +263,7 @@ absl::Status CheckLocalExecutor(const LocalExecutorOptions& options) {
 absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                             const Clock& clock) {
   RETURN_IF_ERROR(CheckLocalExecutor(options));
-  RETURN_IF_ERROR(PrepareDirectory(options.directory));
+  RETURN_IF_ERROR(PrepareWorkFolder(options.directory));
   LocalExecutorOptions filled = options;
   filled.program = std::filesystem::absolute(options.program);
   if (filled.worker_count == 0) {

@@ -35,8 +35,8 @@ absl::Status CheckLocalExecutor(const LocalExecutorOptions& options);
 /// One thread starts and watches all workers, because the kernel sends the parent-death signal when
 /// the starting *thread* ends. A second thread makes the calls that wait for the disk, so that they
 /// delay neither progress nor a cancellation. Errors: those of CheckLocalExecutor,
-/// FailedPrecondition (DATABASE_UNUSABLE: the directory cannot be made). `clock` must outlive the
-/// executor.
+/// FailedPrecondition (WORK_FOLDER_UNUSABLE: the directory cannot be made). `clock` must outlive
+/// the executor.
 absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                             const Clock& clock);
 

@@ -14,6 +14,7 @@
 #include "server/decomposition/job_rules.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/oom_kills.h"
+#include "server/decomposition/work_folder.h"
 #include "server/decomposition/worker_command.h"
 
 namespace carillon {
@@ -101,9 +102,7 @@ absl::StatusOr<PreparedTask> PreparedTask::Make(DecompositionTask task,
   std::error_code error;
   std::filesystem::remove_all(path, error);
   if (!std::filesystem::create_directory(path, error)) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                   absl::StrCat("the folder ", path.string(), " cannot be made (", error.message(),
-                                "): see that this user may write there"));
+    return UnusableWorkFolder(path, error);
   }
   ScratchFolder folder(path);
   RETURN_IF_ERROR(task.write_input(folder / "mesh"));

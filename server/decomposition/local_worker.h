@@ -56,7 +56,7 @@ struct WorkerShare {
 /// A task with its mesh in a folder of its own, ready to be started.
 struct PreparedTask {
   /// Makes the folder `path` and writes the mesh into it.
-  /// Errors: those of write_input, FailedPrecondition (DATABASE_UNUSABLE).
+  /// Errors: those of write_input, FailedPrecondition (WORK_FOLDER_UNUSABLE).
   static absl::StatusOr<PreparedTask> Make(DecompositionTask task,
                                            const std::filesystem::path& path);
 

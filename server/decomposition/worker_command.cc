@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/worker_request_text.h"
+#include "server/decomposition/work_folder.h"
 
 namespace carillon {
 
@@ -33,8 +34,7 @@ absl::Status WriteWorkerRequest(const DecompositionTask& task, const std::filesy
   out << WorkerRequestFile(task);
   out.close();
   if (!out.fail()) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
-                 absl::StrCat(file.string(), " cannot be written: see that its folder has room"));
+  return UnusableWorkFolder(file, std::make_error_code(std::errc::no_space_on_device));
 }
 
 std::vector<std::string> WorkerCommand(const WorkerPlace& place) {

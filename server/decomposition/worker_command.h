@@ -28,7 +28,7 @@ constexpr uint32_t kWayCount = 3;
 /// v1::WorkerRequest in protobuf's text form.
 std::string WorkerRequestFile(const DecompositionTask& task);
 
-/// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (DATABASE_UNUSABLE).
+/// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (WORK_FOLDER_UNUSABLE).
 absl::Status WriteWorkerRequest(const DecompositionTask& task, const std::filesystem::path& file);
 
 /// Returns the command line of carillon-precompute, which writes its events to descriptor 3.

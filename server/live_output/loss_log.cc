@@ -23,20 +23,21 @@ void LossLog::Note(uint64_t lost_frame_count, std::chrono::nanoseconds now, bool
   // replaced, belong to the fault.
   const bool is_gap = lost_now > 0 && !explained && !was_explained_;
   was_explained_ = explained;
-  if (is_gap) {
-    gap_frame_count_ += lost_now;
-    if (!last_gap_) {
-      log_(absl::StrCat("the sound has gaps: ", Text(lost_now),
-                        " were lost, because the machine is too busy to render or play in time, or "
-                        "because the daemon was stopped"));
-    }
+  if (is_gap && !last_gap_) {
+    log_(absl::StrCat("the sound has gaps: ", Text(lost_now),
+                      " were lost, because the machine is too busy to render or play in time, or "
+                      "because the daemon was stopped"));
     last_gap_ = now;
-  } else if (last_gap_ && now - *last_gap_ >= kQuietTime) {
-    log_(absl::StrCat("the sound has had no gaps for ", kQuietTime.count(), " s; ",
-                      Text(gap_frame_count_), " were lost while it had some"));
-    last_gap_.reset();
-    gap_frame_count_ = 0;
   }
+  if (!last_gap_) return;
+  gap_frame_count_ += lost_now;
+  // A fault of the device is no end of the gaps.
+  if (lost_now > 0 || explained) last_gap_ = now;
+  if (now - *last_gap_ < kQuietTime) return;
+  log_(absl::StrCat("the sound has had no gaps for ", kQuietTime.count(), " s; ",
+                    Text(gap_frame_count_), " were lost while it had some"));
+  last_gap_.reset();
+  gap_frame_count_ = 0;
 }
 
 std::string LossLog::Text(uint64_t frame_count) const {

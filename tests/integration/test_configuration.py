@@ -41,24 +41,29 @@ class ConfigurationTest(unittest.TestCase):
                                  # An address for documentation, which no machine has (RFC 5737).
                                  ({"metrics": "192.0.2.1:9464"}, "LISTEN_FAILED: cannot serve metrics on "
                                   "192.0.2.1:9464: Cannot assign requested address; let --metrics name a free port"),
-                                 ({"metrics": "[::1]:9464"}, f"INVALID_CONFIGURATION: {self.file} line 4: metrics is"),
-                                 ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"},
-                                  f"INVALID_CONFIGURATION: {self.file} line 4: metrics is"),
-                                 ({"workers": True}, f"INVALID_CONFIGURATION: {self.file} line 4: workers has a value"),
+                                 ({"metrics": "[::1]:9464"}, "INVALID_CONFIGURATION: metrics is"),
+                                 ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics is"),
+                                 ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
                                  ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
                                  ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
                                  ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
                                  ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),
+                                 ({"audio_device": f"file:{self.folder}/no/a.wav"}, "AUDIO_FILE_FAILED: cannot write"),
+                                 ({"audio_device": f"file:{self.folder}"}, "AUDIO_FILE_FAILED: cannot write"),
                                  ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
                                  ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
                                  ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
                                  ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
-                                 ({"sample_rate": 1}, f"INVALID_CONFIGURATION: {self.file} line 4: sample_rate is 1")):
+                                 ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate is 1")):
+            word, _, message = reason.partition(": ")
+            wrong = "tls_certificate" if "tls_certificate" in settings else min(settings)
+            # The first three lines are those of run_daemon.
+            line = 1 + [*dict.fromkeys(("data_dir", "listen", "audio_device", *settings))].index(wrong)
             for arguments in (("--check-config",), ()):
                 with self.subTest(settings=settings, arguments=arguments):
                     refused = self.run_daemon(settings, *arguments)
                     self.assertEqual((refused.returncode, refused.stdout), (2, ""), refused.stderr)
-                    self.assertIn(f"error: {reason}", refused.stderr)
+                    self.assertIn(f"error: {word}: {self.file} line {line}: {message}", refused.stderr)
         self.assertEqual(sorted(self.folder.iterdir()), files)  # nothing was made
 
     def test_what_a_start_takes_is_valid_and_the_check_makes_nothing(self):
@@ -71,6 +76,20 @@ class ConfigurationTest(unittest.TestCase):
                 self.assertEqual((checked.returncode, checked.stdout), (0, "the configuration is valid\n"),
                                  checked.stderr)
         self.assertEqual(list(self.folder.iterdir()), [self.file])
+
+    def test_a_flag_that_overrides_the_file_is_not_blamed_on_the_file(self):
+        refused = self.run_daemon({"listen": [f"unix:{self.folder}/a"]}, "--check-config", "--listen", "foo")
+        self.assertEqual(refused.returncode, 2)
+        self.assertRegex(refused.stderr, 'error: INVALID_ADDRESS: "?foo')
+
+    def test_a_database_that_this_user_may_not_write_is_found_by_the_check(self):
+        self.assertEqual(self.run_daemon({}, "db", "check").returncode, 1)  # there is none yet
+        data = self.folder / "data"
+        data.mkdir(exist_ok=True)
+        (data / "carillon.db").symlink_to("carillon.db")
+        checked = self.run_daemon({}, "--check-config")
+        self.assertEqual(checked.returncode, 2)
+        self.assertIn(f'DATABASE_UNUSABLE: {self.file} line 1: "{data}/carillon.db" cannot be used: ', checked.stderr)
 
     def test_metrics_at_a_port_that_is_taken_are_valid_but_stop_a_start_with_the_cause(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:

@@ -4,6 +4,7 @@ daemon sits at the socket."""
 
 import contextlib
 import json
+import os
 import pathlib
 import shutil
 import socket
@@ -86,8 +87,56 @@ class HealthTest(unittest.TestCase):
         self.precompute.unlink()
         self.wait_until_not_serving(self.DECOMPOSITIONS)
         found = self.findings()
-        self.assertRegex(found["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*put that program back")
+        self.assertRegex(found["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*Put that program back")
         self.assertNotIn("database", found)
+
+    def test_health_and_doctor_find_a_folder_of_decompositions_that_cannot_be_used(self):
+        work = self.folder / "data/work"
+        work.rmdir()
+        work.write_text("not a folder")
+        self.wait_until_not_serving(self.DECOMPOSITIONS)
+        self.assertRegex(self.findings()["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*folder work")
+        self.assertRegex((self.folder / "log").read_text(), "decompositions_impossible error=.WORK_FOLDER_UNUSABLE: "
+                         f"{work}, .*remove what is there")
+        work.unlink()
+        end_s = time.monotonic() + 30
+        while self.daemon.health(self.DECOMPOSITIONS) != "SERVING":
+            self.assertLess(time.monotonic(), end_s)
+            time.sleep(0.05)
+
+    def test_the_doctor_checks_the_settings_with_the_environment_of_the_daemon(self):
+        self.daemon.stop()
+        file = self.folder / "carillond.toml"
+        file.write_text("workers = 1\n")
+        self.daemon.environment = {**os.environ, "CONFIGURATION_DIRECTORY": str(self.folder)}
+        self.daemon.start()
+        self.assertIn("settings", self.findings("OK"))
+        file.write_text("workers = 1\nlog_level = \"a\\u001b[2K\\rok  settings\"\n")
+        found = self.findings()["settings"]
+        self.assertRegex(found, f"would not start again: INVALID_CONFIGURATION: {file} line 2: log_level is ")
+        self.assertNotIn("\x1b", found)
+
+    @unittest.skipIf(os.geteuid() != 0, "only root can be another user")
+    def test_the_doctor_of_root_sees_the_files_as_the_user_of_the_daemon_does(self):
+        self.daemon.stop()
+        access = self.folder / "access"
+        access.write_text(f"robot listen sha256:{0:064}\n")
+        self.folder.chmod(0o755)
+        os.chown(self.folder / "data", 65534, 4)
+        for file in (self.folder / "data").iterdir():
+            os.chown(file, 65534, 4)
+        socket_folder = self.folder / "sockets"
+        socket_folder.mkdir(mode=0o700)
+        os.chown(socket_folder, 65534, 65534)
+        self.daemon.server = f"unix:{socket_folder}/socket"
+        self.daemon.prefix = ("setpriv", "--reuid=65534", "--regid=65534", "--groups=4")
+        self.daemon.arguments += ["--access-file", str(access)]
+        os.chown(access, 0, 4)
+        access.chmod(0o640)
+        self.daemon.start()
+        self.assertIn("settings", self.findings("OK"))
+        os.chown(access, 0, 0)
+        self.assertRegex(self.findings()["settings"], "ACCESS_FILE_UNUSABLE: .*Permission denied")
 
     def test_the_doctor_finds_a_database_that_was_moved_away(self):
         (self.folder / "data/carillon.db").rename(self.folder / "data/away.db")

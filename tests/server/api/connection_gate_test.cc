@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <netinet/in.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -123,6 +124,22 @@ TEST_F(ConnectionGateTest, ClosesConnectionsBeyondItsLimitAndAcceptsAgainWhenOne
   Connect();
   taken_.acquire();
   EXPECT_TRUE(IsClosed(Connect()));
+}
+
+TEST_F(ConnectionGateTest, ConnectionsThatHaveEndedTakeNoMemory) {
+  Open(100000);
+  const auto allocated_after = [this](int count) {
+    for (int i = 0; i < count; ++i) {
+      const int client = Connect();
+      taken_.acquire();
+      close(keeper_->newest);
+      close(client);
+    }
+    return mallinfo2().uordblks;
+  };
+  const size_t before = allocated_after(500);
+  // Without an end of that memory, each connection takes 150 bytes.
+  EXPECT_LT(allocated_after(2000), before + 100000);
 }
 
 TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) {

@@ -220,8 +220,7 @@ TEST_F(EventApi, AFloodOfScenesIsLimitedAndWhatAdministratorsDoIsAllTold) {
 
 class EventsWithoutAdministrator : public ServedDaemon {
  protected:
-  EventsWithoutAdministrator()
-      : ServedDaemon({.precompute_program = "/usr/bin/carillon-precompute"}, {"127.0.0.1:0"}) {}
+  EventsWithoutAdministrator() : ServedDaemon({}, {"127.0.0.1:0"}) {}
 };
 
 TEST_F(EventsWithoutAdministrator, ARefusalNamesTheCall) {
@@ -239,12 +238,11 @@ TEST_F(EventsWithoutAdministrator, ARefusalNamesTheCall) {
                            HasSubstr(" was refused: CREDENTIAL_MISSING: ")));
 }
 
-TEST_F(EventsWithoutAdministrator, LossAndReturnOfDecompositionsNameTheProgram) {
+TEST_F(EventsWithoutAdministrator, LossAndReturnOfDecompositionsNameTheCause) {
   for (const bool can : {false, true}) {
     SetCanDecompose(can);
-    const std::string line =
-        absl::StrCat(can ? "decompositions_possible" : "decompositions_impossible",
-                     " program=/usr/bin/carillon-precompute");
+    const std::string line = can ? "decompositions_possible"
+                                 : "decompositions_impossible error=\"WORKER_NOT_FOUND: none\"";
     while (!std::ranges::count(events(), line)) {
     }
   }
