@@ -23,38 +23,42 @@ class ConfigurationTest(unittest.TestCase):
         return subprocess.run([BIN / "carillond", "--config", self.file, *arguments], capture_output=True, text=True,
                               check=False, timeout=60)
 
+    def wrong_settings(self):
+        """Settings that a start refuses, each with the beginning of the refusal."""
+        return (({"listen": ["foo"]}, "INVALID_ADDRESS"),
+                ({"listen": ["127.0.0.1:99999"]}, "INVALID_ADDRESS"),
+                ({"listen": ["0.0.0.0:5001"]}, "TLS_REQUIRED"),
+                ({"listen": [f"unix:{self.folder}/empty"]}, "LISTEN_FAILED"),
+                ({"listen": ["127.0.0.1:0"], "tls_certificate": "/nope", "tls_key": "/nope"},
+                 "TLS_UNUSABLE"),
+                ({"listen": ["127.0.0.1:5001", "unix:/tmp/a", "127.0.0.1:5001"]},
+                 "INVALID_ADDRESS: --listen names 127.0.0.1:5001 twice"),
+                ({"listen": [f"unix:{self.folder}/a", f"unix:{self.folder}/b/../a"]},
+                 "INVALID_ADDRESS: --listen names unix:"),
+                ({"metrics": "no.such.host.invalid:9464"},
+                 "LISTEN_FAILED: cannot serve metrics on no.such.host.invalid:9464: "),
+                # An address for documentation, which no machine has (RFC 5737).
+                ({"metrics": "192.0.2.1:9464"}, "LISTEN_FAILED: cannot serve metrics on "
+                 "192.0.2.1:9464: Cannot assign requested address; let --metrics name a free port"),
+                ({"metrics": "[::1]:9464"}, "INVALID_CONFIGURATION: metrics is"),
+                ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics is"),
+                ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
+                ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
+                ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
+                ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
+                ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),
+                ({"audio_device": f"file:{self.folder}/no/a.wav"}, "AUDIO_FILE_FAILED: cannot write"),
+                ({"audio_device": f"file:{self.folder}"}, "AUDIO_FILE_FAILED: cannot write"),
+                ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
+                ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
+                ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
+                ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
+                ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate is 1"))
+
     def test_what_a_start_would_refuse_is_found_by_the_check_and_ends_with_status_2(self):
         (self.folder / "empty").touch(0o600)
         files = sorted([*self.folder.iterdir(), self.file])
-        for settings, reason in (({"listen": ["foo"]}, "INVALID_ADDRESS"),
-                                 ({"listen": ["127.0.0.1:99999"]}, "INVALID_ADDRESS"),
-                                 ({"listen": ["0.0.0.0:5001"]}, "TLS_REQUIRED"),
-                                 ({"listen": [f"unix:{self.folder}/empty"]}, "LISTEN_FAILED"),
-                                 ({"listen": ["127.0.0.1:0"], "tls_certificate": "/nope", "tls_key": "/nope"},
-                                  "TLS_UNUSABLE"),
-                                 ({"listen": ["127.0.0.1:5001", "unix:/tmp/a", "127.0.0.1:5001"]},
-                                  "INVALID_ADDRESS: --listen names 127.0.0.1:5001 twice"),
-                                 ({"listen": [f"unix:{self.folder}/a", f"unix:{self.folder}/b/../a"]},
-                                  "INVALID_ADDRESS: --listen names unix:"),
-                                 ({"metrics": "no.such.host.invalid:9464"},
-                                  "LISTEN_FAILED: cannot serve metrics on no.such.host.invalid:9464: "),
-                                 # An address for documentation, which no machine has (RFC 5737).
-                                 ({"metrics": "192.0.2.1:9464"}, "LISTEN_FAILED: cannot serve metrics on "
-                                  "192.0.2.1:9464: Cannot assign requested address; let --metrics name a free port"),
-                                 ({"metrics": "[::1]:9464"}, "INVALID_CONFIGURATION: metrics is"),
-                                 ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics is"),
-                                 ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
-                                 ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
-                                 ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
-                                 ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
-                                 ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),
-                                 ({"audio_device": f"file:{self.folder}/no/a.wav"}, "AUDIO_FILE_FAILED: cannot write"),
-                                 ({"audio_device": f"file:{self.folder}"}, "AUDIO_FILE_FAILED: cannot write"),
-                                 ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
-                                 ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
-                                 ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
-                                 ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
-                                 ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate is 1")):
+        for settings, reason in self.wrong_settings():
             word, _, message = reason.partition(": ")
             wrong = "tls_certificate" if "tls_certificate" in settings else min(settings)
             # The first three lines are those of run_daemon.

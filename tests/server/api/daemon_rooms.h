@@ -23,20 +23,20 @@ struct DaemonRooms {
     settings.addresses = {address};
     settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
     settings.version = "test";
-    server = *ApiServer::Start(settings, {.database = *database,
-                                          .decompositions = *queue,
-                                          .runs = runs,
-                                          .scenes = scenes,
-                                          .output = *output,
-                                          .clock = clock,
-                                          .log = [this](const std::string& line) { Note(line); },
-                                          .log_event = [this](const Event& event) { Note(event); },
-                                          .check_decomposition =
-                                              [this] {
-                                                return can_decompose
-                                                           ? absl::OkStatus()
-                                                           : absl::NotFoundError("WORKER_NOT_FOUND: none");
-                                              }});
+    server = *ApiServer::Start(
+        settings, {.database = *database,
+                   .decompositions = *queue,
+                   .runs = runs,
+                   .scenes = scenes,
+                   .output = *output,
+                   .clock = clock,
+                   .log = [this](const std::string& line) { Note(line); },
+                   .log_event = [this](const Event& event) { Note(event); },
+                   .check_decomposition =
+                       [this] {
+                         return can_decompose ? absl::OkStatus()
+                                              : absl::NotFoundError("WORKER_NOT_FOUND: none");
+                       }});
   }
 
   std::unique_ptr<DecompositionQueue> MakeQueue() {
