@@ -124,6 +124,11 @@ absl::Status ReadKey(const std::string& key, const toml::node& node, Options& op
   return status;
 }
 
+/// Returns the flag for a setting of the file.
+std::string FlagOf(absl::string_view key) {
+  return absl::StrCat("--", absl::StrReplaceAll(key, {{"_", "-"}}));
+}
+
 /// Returns a line of a file as text for people. `line` is zero if the whole file is meant.
 std::string PlaceIn(const std::string& path, uint32_t line) {
   return line == 0 ? path : absl::StrCat(path, " line ", line);
@@ -150,11 +155,19 @@ absl::Status ReadFile(const std::string& path, Options& options, SettingPlaces& 
   return absl::OkStatus();
 }
 
+/// Adds the place of a setting in the file to an error that names the setting by its flag.
+absl::Status WithPlace(const absl::Status& status, const SettingPlaces& places) {
+  for (const auto& [key, place] : places) {
+    const std::string message = ToErrorInfo(status).message();
+    if (absl::StrContains(message, FlagOf(key))) return MistakeAt(place, message);
+  }
+  return status;
+}
+
 absl::Status Check(const Options& options) {
   absl::Status status = absl::OkStatus();
   VisitSettings(options, [&status](absl::string_view key, const auto& setting) {
-    const std::string flag = absl::StrCat("--", absl::StrReplaceAll(key, {{"_", "-"}}));
-    if (status.ok()) status = CheckSetting(key, flag, setting);
+    if (status.ok()) status = CheckSetting(key, FlagOf(key), setting);
   });
   RETURN_IF_ERROR(status);
   return CheckTogether(options);
@@ -324,7 +337,7 @@ absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
   for (const std::string& name : DifferentSettings(of_file, command.options)) {
     command.places.erase(name);
   }
-  RETURN_IF_ERROR(Check(command.options));
+  RETURN_IF_ERROR(WithPlace(Check(command.options), command.places));
   command.run = true;
   return command;
 }

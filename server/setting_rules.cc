@@ -106,13 +106,17 @@ absl::Status CheckValues(int argc, const char* const* argv) {
 }
 
 absl::Status CheckIsFile(const std::string& path) {
-  // A folder can be opened, and would be an empty file. A named pipe would wait for a writer.
+  // A folder and a device can be opened, and would be empty files. A named pipe would wait for a
+  // writer.
   std::error_code ignored;
-  const bool is_folder = std::filesystem::is_directory(path, ignored);
-  const auto type = std::filesystem::symlink_status(path, ignored).type();
-  if (!is_folder && type != std::filesystem::file_type::fifo) return absl::OkStatus();
-  return InvalidConfiguration(
-      absl::StrCat(path, ": it is a ", is_folder ? "folder" : "named pipe", "; name a TOML file"));
+  const std::filesystem::file_status file = std::filesystem::status(path, ignored);
+  if (std::filesystem::is_regular_file(file) || !std::filesystem::exists(file)) {
+    return absl::OkStatus();
+  }
+  const char* const what = std::filesystem::is_directory(file) ? "folder"
+                           : std::filesystem::is_fifo(file)    ? "named pipe"
+                                                               : "device or a socket";
+  return InvalidConfiguration(absl::StrCat(path, ": it is a ", what, "; name a TOML file"));
 }
 
 absl::Status CheckTogether(const Options& options) {

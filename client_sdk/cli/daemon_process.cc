@@ -14,9 +14,11 @@
 #include <limits>
 #include <system_error>
 
+#include "absl/algorithm/container.h"
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
@@ -116,22 +118,11 @@ std::vector<std::string> ArgumentsOf(pid_t process) { return ReadWords(process, 
 
 std::vector<std::string> EnvironmentOf(pid_t process) { return ReadWords(process, "environ"); }
 
-std::optional<ProcessOwner> OwnerOf(pid_t process) {
-  ProcessOwner owner;
-  int found_count = 0;
-  for (const absl::string_view line :
-       absl::StrSplit(Read(absl::StrCat("/proc/", process, "/status")), '\n')) {
-    std::vector<std::string> words =
-        absl::StrSplit(line, absl::ByAnyChar("\t "), absl::SkipEmpty());
-    if (words.empty()) continue;
-    // The second number is the effective one, which decides about files.
-    if (words[0] == "Uid:")
-      found_count += words.size() > 2 && absl::SimpleAtoi(words[2], &owner.user);
-    if (words[0] == "Gid:")
-      found_count += words.size() > 2 && absl::SimpleAtoi(words[2], &owner.group);
-    if (words[0] == "Groups:") owner.other_groups.assign(words.begin() + 1, words.end());
-  }
-  return found_count == 2 ? std::optional(owner) : std::nullopt;
+bool IsOwn(pid_t process) {
+  const std::string own = absl::StrJoin(std::vector<uid_t>(4, geteuid()), "\t");
+  const std::vector<std::string> lines =
+      absl::StrSplit(Read(absl::StrCat("/proc/", process, "/status")), '\n');
+  return absl::c_linear_search(lines, absl::StrCat("Uid:\t", own));
 }
 
 bool IsMute(const std::string& socket_path, std::chrono::milliseconds time) {

@@ -32,15 +32,9 @@ std::vector<std::string> ArgumentsOf(pid_t process);
 /// user cannot see them.
 std::vector<std::string> EnvironmentOf(pid_t process);
 
-/// The numbers of a process's user and groups.
-struct ProcessOwner {
-  uid_t user = 0;
-  gid_t group = 0;
-  std::vector<std::string> other_groups{};
-};
-
-/// Returns the owner of a process, or nothing if the process is gone.
-std::optional<ProcessOwner> OwnerOf(pid_t process);
+/// Returns whether the real, effective, saved and file-system users of a process are all this user.
+/// The users of a program with the set-user-ID bit differ.
+bool IsOwn(pid_t process);
 
 /// Returns whether the process at a Unix socket takes no connection, or sends nothing on one within
 /// the time. A daemon sends its HTTP/2 settings at once. If no process listens there, the result is

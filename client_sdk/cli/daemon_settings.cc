@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/daemon_settings.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -14,7 +12,6 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
@@ -38,23 +35,6 @@ constexpr auto kVariables =
 
 using Words = std::vector<std::string>;
 
-void Append(Words& words, const Words& more) {
-  words.insert(words.end(), more.begin(), more.end());
-}
-
-/// Returns the words before a program that let it run with the user and the groups of a daemon, or
-/// nothing if this user may not do that. A daemon's program must not run with the rights of root.
-std::optional<Words> WordsToRunAs(const ProcessOwner& owner) {
-  if (owner.user == geteuid()) return Words();
-  if (geteuid() != 0) return std::nullopt;
-  return Words{"setpriv", absl::StrCat("--reuid=", owner.user),
-               absl::StrCat("--regid=", owner.group),
-               owner.other_groups.empty()
-                   ? "--clear-groups"
-                   : absl::StrCat("--groups=", absl::StrJoin(owner.other_groups, ",")),
-               "--no-new-privs"};
-}
-
 /// Returns the program of a process, which may have been replaced by an upgrade, or nothing if it
 /// is gone.
 std::optional<std::string> ProgramFileOf(const std::string& folder) {
@@ -75,41 +55,41 @@ std::string MessageIn(const std::string& output) {
       std::string(absl::StripAsciiWhitespace(parts.second.empty() ? output : parts.second)));
 }
 
-/// Runs a check of the settings.
+/// Runs a check of the settings. A check that does not end in time, or ends otherwise than
+/// carillond does, tells nothing.
 std::optional<absl::Status> Run(const Words& words, const std::string& folder) {
   absl::StatusOr<Pipe> errors = Pipe::Make();
-  if (!errors.ok()) return std::nullopt;
+  if (!errors.ok() || !errors->DoNotWait().ok()) return std::nullopt;
   absl::StatusOr<ChildProcess> check =
       ChildProcess::Start({.words = words, .errors = errors->write_end(), .folder = folder});
   if (!check.ok()) return std::nullopt;
   errors->CloseWriteEnd();
-  const std::string output = errors->Read(kLongestOutput);
+  // The pipe is not read to its end, which a child of the check could put off.
   const ProcessEnd end = check->Wait();
   if (end.exited && end.status == 0) return absl::OkStatus();
-  if (!end.exited || end.status != kWrongSettings) return std::nullopt;
-  return absl::FailedPreconditionError(MessageIn(output));
+  const std::string message = MessageIn(errors->Read(kLongestOutput));
+  if (!end.exited || end.status != kWrongSettings || message.empty()) return std::nullopt;
+  return absl::FailedPreconditionError(message);
 }
 
 }  // namespace
 
 std::optional<absl::Status> CheckSettingsOf(pid_t process) {
   const std::string folder = absl::StrCat("/proc/", process);
-  const std::optional<ProcessOwner> owner = OwnerOf(process);
   const Words arguments = ArgumentsOf(process);
-  if (ProgramOf(process) != "carillond" || !owner || arguments.empty()) return std::nullopt;
-  const std::optional<Words> as_owner = WordsToRunAs(*owner);
-  if (!as_owner) return std::nullopt;
+  // The program of another user must never run with the rights of this one.
+  if (!IsOwn(process) || ProgramOf(process) != "carillond" || arguments.empty()) {
+    return std::nullopt;
+  }
   const std::optional<std::string> program = ProgramFileOf(folder);
   if (!program) return absl::FailedPreconditionError("its program is gone: install it again");
-  Words words = {"timeout", kLongestS};
-  Append(words, *as_owner);
-  Append(words, {"env", "-i"});
+  Words words = {"timeout", kLongestS, "env", "-i"};
   for (const std::string& variable : EnvironmentOf(process)) {
     const auto begins = [&](absl::string_view name) { return absl::StartsWith(variable, name); };
     if (std::ranges::any_of(kVariables, begins)) words.push_back(variable);
   }
   words.push_back(*program);
-  Append(words, {arguments.begin() + 1, arguments.end()});
+  words.insert(words.end(), arguments.begin() + 1, arguments.end());
   words.push_back("--check-config");
   return Run(words, folder + "/cwd");
 }

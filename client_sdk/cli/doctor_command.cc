@@ -246,8 +246,9 @@ void CheckSettings(const Program& program, Findings& findings) {
   const auto checked = *process == 0 ? std::nullopt : CheckSettingsOf(*process);
   if (!checked) {
     findings.Unknown("settings",
-                     "run this as root or as the daemon's user, and where the daemon runs, to have "
-                     "its settings and the files that they name checked as at a start");
+                     "run this as the daemon's user, where the daemon runs, to have its settings "
+                     "and the files that they name checked as at a start (runuser -u carillon -- "
+                     "carillon doctor)");
   } else if (checked->ok()) {
     findings.Good("settings", "a start would accept the settings and the files that they name");
   } else {

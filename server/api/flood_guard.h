@@ -23,11 +23,11 @@ inline constexpr int kMaxCallsOfConnection = 256;
 inline constexpr double kMaxFailedCallsPerSecond = 2000;
 
 /// Greatest number of open calls on all connections of one process (Unix) or address (TCP).
-inline constexpr uint64_t kMaxCallsOfSource = 16'384;
+inline constexpr uint64_t kMaxCallsOfSource = 4096;
 
 /// Greatest number of calls that may fail in a second on all connections of one process or address,
 /// averaged over a second. Calls fail that are open when their connection ends.
-inline constexpr double kMaxFailedCallsOfSource = 5000;
+inline constexpr double kMaxFailedCallsOfSource = 2500;
 
 /// Greatest number of bytes that may come over a TCP connection without a new call or a whole
 /// message. There may be more for open calls, for what the client receives, and for pings, see

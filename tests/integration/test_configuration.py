@@ -44,6 +44,7 @@ class ConfigurationTest(unittest.TestCase):
                 ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics is"),
                 ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
                 ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
+                ({"tls_key": "/x"}, "INVALID_CONFIGURATION: --tls-certificate and --tls-key must be given together"),
                 ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
                 ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
                 ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),

@@ -117,26 +117,40 @@ class HealthTest(unittest.TestCase):
         self.assertNotIn("\x1b", found)
 
     @unittest.skipIf(os.geteuid() != 0, "only root can be another user")
-    def test_the_doctor_of_root_sees_the_files_as_the_user_of_the_daemon_does(self):
-        self.daemon.stop()
-        access = self.folder / "access"
-        access.write_text(f"robot listen sha256:{0:064}\n")
+    def test_the_doctor_of_root_executes_no_program_of_another_user(self):
+        """Among these is a process of that user with the set-user-ID bit, whose effective user is root."""
+        proof = self.folder / "proof"
         self.folder.chmod(0o755)
-        os.chown(self.folder / "data", 65534, 4)
-        for file in (self.folder / "data").iterdir():
-            os.chown(file, 65534, 4)
-        socket_folder = self.folder / "sockets"
-        socket_folder.mkdir(mode=0o700)
-        os.chown(socket_folder, 65534, 65534)
-        self.daemon.server = f"unix:{socket_folder}/socket"
-        self.daemon.prefix = ("setpriv", "--reuid=65534", "--regid=65534", "--groups=4")
-        self.daemon.arguments += ["--access-file", str(access)]
-        os.chown(access, 0, 4)
-        access.chmod(0o640)
-        self.daemon.start()
-        self.assertIn("settings", self.findings("OK"))
-        os.chown(access, 0, 0)
-        self.assertRegex(self.findings()["settings"], "ACCESS_FILE_UNUSABLE: .*Permission denied")
+        for name, mode in (("other", 0o755), ("setuid", 0o4755)):
+            with self.subTest(name=name):
+                program = self.folder / name / "carillond"
+                program.parent.mkdir()
+                # It listens, and would prove that somebody else has executed it.
+                subprocess.run(["cc", "-x", "c", "-o", program, "-"], check=True, text=True, input=f"""
+                    #include <fcntl.h>
+                    #include <string.h>
+                    #include <sys/socket.h>
+                    #include <sys/un.h>
+                    #include <unistd.h>
+                    int main(int count, char **words) {{
+                      if (count > 1) return close(creat("{proof}", 0600));
+                      struct sockaddr_un name = {{AF_UNIX, "{program.parent}/socket"}};
+                      int made = socket(AF_UNIX, SOCK_STREAM, 0);
+                      bind(made, (struct sockaddr *)&name, sizeof name);
+                      listen(made, 9);
+                      write(1, "\\n", 1);
+                      while (1) send(accept(made, 0, 0), "x", 1, MSG_NOSIGNAL);
+                    }}""")
+                program.chmod(mode)
+                program.parent.chmod(0o777)
+                impostor = self.enterContext(subprocess.Popen(
+                    ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", program], stdout=subprocess.PIPE))
+                self.addCleanup(impostor.kill)
+                self.assertEqual(impostor.stdout.readline(), b"\n")
+                told = subprocess.run([BIN / "carillon", "--server", f"unix:{program.parent}/socket", "doctor"],
+                                      capture_output=True, text=True, check=False, timeout=120)
+                self.assertRegex(told.stdout, r"(?m)^\? +settings +run this as the daemon's user")
+                self.assertFalse(proof.exists())
 
     def test_the_doctor_finds_a_database_that_was_moved_away(self):
         (self.folder / "data/carillon.db").rename(self.folder / "data/away.db")
