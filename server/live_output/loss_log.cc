@@ -10,7 +10,7 @@ namespace carillon {
 namespace {
 
 /// The gaps have ended when there was none for this time.
-constexpr std::chrono::seconds kQuietTime(10);
+constexpr std::chrono::seconds kQuietTime(60);
 
 }  // namespace
 

@@ -32,14 +32,14 @@ TEST_F(LossLogTest, NamesTheBeginningAndTheEndOfGapsOnceWithTheirFrames) {
   EXPECT_THAT(Lines(), ElementsAre(HasSubstr("the sound has gaps: 4800 frames (0.1 s) were lost")));
   for (int second = 2; second < 100; ++second) log_.Note(4800U * second, seconds(second), false);
   EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(4800U * 99, seconds(108), false);
+  log_.Note(4800U * 99, seconds(158), false);
   EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(4800U * 99, seconds(109), false);
-  EXPECT_THAT(Lines(), ElementsAre(AllOf(HasSubstr("no gaps for 10 s"),
+  log_.Note(4800U * 99, seconds(159), false);
+  EXPECT_THAT(Lines(), ElementsAre(AllOf(HasSubstr("no gaps for 60 s"),
                                          HasSubstr("475200 frames (9.9 s) were lost"))));
-  log_.Note(4800U * 99, seconds(200), false);
+  log_.Note(4800U * 99, seconds(250), false);
   EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(4800U * 99 + 48, seconds(300), false);
+  log_.Note(4800U * 99 + 48, seconds(350), false);
   EXPECT_THAT(Lines(), ElementsAre(HasSubstr("gaps: 48 frames (0.001 s) were lost")));
 }
 
@@ -47,9 +47,9 @@ TEST_F(LossLogTest, FramesOfAFaultThatTheLogNamesAreNoGaps) {
   log_.Note(100, seconds(1), true);
   log_.Note(200, seconds(2), true);
   log_.Note(300, seconds(3), false);  // lost before the fault ended
-  log_.Note(300, seconds(20), false);
+  log_.Note(300, seconds(90), false);
   EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(400, seconds(21), false);
+  log_.Note(400, seconds(91), false);
   EXPECT_THAT(Lines(), ElementsAre(HasSubstr("gaps: 100 frames")));
 }
 
@@ -58,10 +58,10 @@ TEST_F(LossLogTest, GapsDoNotEndWhileTheDeviceHasAFault) {
   EXPECT_THAT(Lines(), ElementsAre(HasSubstr("gaps: 100 frames")));
   for (int second = 2; second < 100; ++second) log_.Note(100U * second, seconds(second), true);
   log_.Note(10000, seconds(100), false);
-  log_.Note(10000, seconds(109), false);
+  log_.Note(10000, seconds(159), false);
   EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(10000, seconds(110), false);
-  EXPECT_THAT(Lines(), ElementsAre(HasSubstr("no gaps for 10 s; 10000 frames")));
+  log_.Note(10000, seconds(160), false);
+  EXPECT_THAT(Lines(), ElementsAre(HasSubstr("no gaps for 60 s; 10000 frames")));
 }
 
 }  // namespace
