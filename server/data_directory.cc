@@ -58,7 +58,9 @@ bool IsOfKernel(const std::filesystem::path& path) {
 
 /// Checks that this user may change the files that are there.
 absl::Status CheckFiles(const std::filesystem::path& folder) {
-  for (const char* name : {"lock", "carillon.db", "carillon.db-wal", "carillon.db-shm"}) {
+  const std::string database = DataDirectory::kDatabaseName;
+  for (const std::string& name :
+       {std::string("lock"), database, database + "-wal", database + "-shm"}) {
     const std::filesystem::path file = folder / name;
     if (faccessat(AT_FDCWD, file.c_str(), R_OK | W_OK, AT_EACCESS) == 0 || errno == ENOENT) {
       continue;

@@ -17,8 +17,9 @@ class DataDirectory {
  public:
   static constexpr char kDatabaseName[] = "carillon.db";
 
-  /// Checks whether Open could use or create the folder, without locking or creating anything.
-  /// Errors: FailedPrecondition (DATA_DIRECTORY_UNUSABLE).
+  /// Checks whether Open could use or create the folder, and whether this user may change the files
+  /// of the database there, without locking or creating anything. Errors: FailedPrecondition
+  /// (DATA_DIRECTORY_UNUSABLE, DATABASE_UNUSABLE).
   static absl::Status Check(const std::filesystem::path& path);
 
   /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,

@@ -134,10 +134,6 @@ std::string PlaceIn(const std::string& path, uint32_t line) {
   return line == 0 ? path : absl::StrCat(path, " line ", line);
 }
 
-absl::Status MistakeAt(const std::string& place, absl::string_view what) {
-  return InvalidConfiguration(absl::StrCat(place, ": ", what));
-}
-
 absl::Status ReadFile(const std::string& path, Options& options, SettingPlaces& places) {
   RETURN_IF_ERROR(CheckIsFile(path));
   try {
@@ -145,12 +141,12 @@ absl::Status ReadFile(const std::string& path, Options& options, SettingPlaces& 
     for (const auto& [key, node] : table) {
       const std::string place = PlaceIn(path, key.source().begin.line);
       const absl::Status status = ReadKey(std::string(key.str()), node, options);
-      if (!status.ok()) return MistakeAt(place, ToErrorInfo(status).message());
+      if (!status.ok()) return AtPlace(status, place);
       places.emplace(key.str(), place);
     }
   } catch (const toml::parse_error& error) {
-    return MistakeAt(PlaceIn(path, error.source().begin.line),
-                     {error.description().data(), error.description().size()});
+    return AtPlace(InvalidConfiguration({error.description().data(), error.description().size()}),
+                   PlaceIn(path, error.source().begin.line));
   }
   return absl::OkStatus();
 }
@@ -158,8 +154,7 @@ absl::Status ReadFile(const std::string& path, Options& options, SettingPlaces& 
 /// Adds the place of a setting in the file to an error that names the setting by its flag.
 absl::Status WithPlace(const absl::Status& status, const SettingPlaces& places) {
   for (const auto& [key, place] : places) {
-    const std::string message = ToErrorInfo(status).message();
-    if (absl::StrContains(message, FlagOf(key))) return MistakeAt(place, message);
+    if (absl::StrContains(status.message(), FlagOf(key))) return AtPlace(status, place);
   }
   return status;
 }

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <string>
 
-#include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/open_device.h"
 #include "server/metrics/metrics_address.h"
+#include "server/setting_rules.h"
 
 namespace carillon {
 namespace {
@@ -29,9 +29,7 @@ std::string ApiSetting(const std::string& reason) {
 absl::Status At(const SettingPlaces& places, const std::string& setting,
                 const absl::Status& status) {
   const auto place = places.find(setting);
-  if (status.ok() || place == places.end()) return status;
-  const v1::ErrorInfo error = ToErrorInfo(status);
-  return Refusal(status.code(), error.reason(), absl::StrCat(place->second, ": ", error.message()));
+  return status.ok() || place == places.end() ? status : AtPlace(status, place->second);
 }
 
 }  // namespace

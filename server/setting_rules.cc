@@ -65,6 +65,11 @@ absl::Status InvalidConfiguration(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION", message);
 }
 
+absl::Status AtPlace(const absl::Status& status, absl::string_view place) {
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  return Refusal(status.code(), error.reason(), absl::StrCat(place, ": ", error.message()));
+}
+
 absl::Status CheckNumber(absl::string_view key, absl::string_view name, double value) {
   const auto* const range = std::ranges::find(kRanges, key, &Range::key);
   if (range == kRanges.end()) return absl::OkStatus();

@@ -12,6 +12,10 @@ namespace carillon {
 /// Returns InvalidArgument (INVALID_CONFIGURATION).
 absl::Status InvalidConfiguration(absl::string_view message);
 
+/// Returns the same refusal with `place`, which is a line of the configuration file, before its
+/// message.
+absl::Status AtPlace(const absl::Status& status, absl::string_view place);
+
 /// Checks one setting that is a number. `key` is the setting's key in the configuration file, and
 /// `name` is how the user wrote it, as a key or as a flag. Errors: InvalidArgument
 /// (INVALID_CONFIGURATION).

@@ -66,7 +66,7 @@ std::string Read(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Returns the texts in a file of /proc that ends each with a zero byte.
+/// Returns the texts in a file of /proc, in which each text ends with a zero byte.
 std::vector<std::string> ReadWords(pid_t process, const char* name) {
   const std::string words = Read(absl::StrCat("/proc/", process, "/", name));
   if (words.empty()) return {};

@@ -17,7 +17,6 @@
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/daemon_process.h"
 #include "proto/cpp/child_process.h"
-#include "proto/cpp/error_reason.h"
 #include "proto/cpp/escaped_text.h"
 
 namespace carillon::cli {

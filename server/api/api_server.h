@@ -58,7 +58,7 @@ struct ServedRooms {
   /// Takes lines that say why the database cannot be changed.
   std::function<void(const std::string& line)> log_error = [](const std::string&) {};
   EventSink log_event = [](const Event&) {};  ///< takes what calls have done
-  /// Returns whether decompositions can run. Called several times a second.
+  /// Returns why decompositions cannot run, or OK. Called several times a second.
   std::function<absl::Status()> check_decomposition = [] { return absl::OkStatus(); };
 };
 

@@ -21,7 +21,7 @@ constexpr uintmax_t kLeastBytes = 256 << 10;
 absl::string_view WhatToDo(const std::error_code& error) {
   if (error == std::errc::no_space_on_device) return "free some space on its disk";
   if (error == std::errc::not_a_directory || error == std::errc::file_exists) {
-    return "remove what is there in place of the folder, which the daemon then makes anew";
+    return "remove the file in place of the folder, which the daemon then makes anew";
   }
   return "see that the daemon's user may write there";
 }

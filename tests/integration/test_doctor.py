@@ -97,7 +97,7 @@ class HealthTest(unittest.TestCase):
         self.wait_until_not_serving(self.DECOMPOSITIONS)
         self.assertRegex(self.findings()["workers"], f"^{self.DECOMPOSITIONS} is NOT_SERVING, .*folder work")
         self.assertRegex((self.folder / "log").read_text(), "decompositions_impossible error=.WORK_FOLDER_UNUSABLE: "
-                         f"{work}, .*remove what is there")
+                         f"{work}, .*remove the file in place of the folder")
         work.unlink()
         end_s = time.monotonic() + 30
         while self.daemon.health(self.DECOMPOSITIONS) != "SERVING":
