@@ -26,6 +26,8 @@ RUN_S = 60 * float(os.environ.get("CARILLON_TORTURE_MINUTES") or torture.rounds(
 PARTS = 2 if RUN_S < 300 else round(RUN_S / 150)
 # The daemon gives freed memory back every 5 s.
 REST_S = 12
+# Prometheus reads the metrics once in so many samples. Each of the 33 threads that serve them takes memory once.
+SAMPLES_PER_SCRAPE = 5
 # Caches and thread pools fill in the first part. The first connections and renderings of a daemon need these.
 WARM_UP_MIB = 32
 # Of the memory at rest after the first part.
@@ -96,7 +98,7 @@ class ChurnTest(torture.ServedTest):
         return {name: value for name, value in self.metrics().items() if name.startswith(wanted) and value != "0"}
 
     def churn(self, model):
-        """Runs the clients for one part; returns the samples of each second."""
+        """Runs the clients for one part, with Prometheus beside them; returns the samples of each second."""
         churn = Churn(self.daemon.server, model)
         samples = []
         try:
@@ -104,6 +106,8 @@ class ChurnTest(torture.ServedTest):
             while time.monotonic() < end_s:
                 time.sleep(min(1.0, RUN_S / 20))
                 samples.append(self.sample())
+                if len(samples) % SAMPLES_PER_SCRAPE == 0:
+                    self.metrics()
         finally:
             churn.stop()
         self.lives += churn.lives
