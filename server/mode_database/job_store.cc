@@ -171,7 +171,7 @@ absl::StatusOr<std::vector<JobRecord>> JobStore::Unfinished() {
 
 absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_token,
                                        const JobFilter& filter) {
-  ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
+  ASSIGN_OR_RETURN(const PageRange range, ParsePage("jobs", page_size, page_token));
   JobPage page;
   RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     return connection.Query(
@@ -180,7 +180,7 @@ absl::StatusOr<JobPage> JobStore::List(int page_size, const std::string& page_to
                      "ORDER BY number DESC LIMIT ?3")
             .c_str(),
         {range.below, filter.label_contains, range.size}, [&](const SqlRow& row) {
-          page.next_page_token = absl::StrCat(row.Int(0));
+          page.next_page_token = PageToken("jobs", row.Int(0));
           page.jobs.push_back(ParseJob(row));
           return absl::OkStatus();
         });

@@ -215,7 +215,7 @@ absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& d
 
 absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_size,
                                            const std::string& page_token) {
-  ASSIGN_OR_RETURN(const PageRange range, ParsePage(page_size, page_token));
+  ASSIGN_OR_RETURN(const PageRange range, ParsePage("models", page_size, page_token));
   ModelPage page;
   bool is_full = false;
   std::vector<std::pair<std::string, absl::Status>> damaged;
@@ -234,7 +234,7 @@ absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_s
   // Damaged models are left out of the page, which makes it shorter but not the last one.
   is_full |= std::ssize(page.models) + std::ssize(damaged) == range.size;
   if (is_full && !page.models.empty()) {
-    page.next_page_token = absl::StrCat(page.models.back().revision);
+    page.next_page_token = PageToken("models", page.models.back().revision);
   }
   return page;
 }

@@ -6,22 +6,33 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon {
 
-absl::StatusOr<PageRange> ParsePage(int page_size, const std::string& page_token) {
+std::string PageToken(absl::string_view list, int64_t last_key) {
+  return absl::StrCat(list, "-", last_key);
+}
+
+absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
+                                    absl::string_view page_token) {
   PageRange page{page_size == 0 ? 100 : std::min<int64_t>(page_size, kMaxPageSize),
                  std::numeric_limits<int64_t>::max()};
   if (page.size < 0) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",
                    absl::StrCat("page_size is ", page_size, ": give zero or more"));
   }
-  if (!page_token.empty() && !absl::SimpleAtoi(page_token, &page.below)) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",
-                   "page_token is not one of an earlier answer: leave it empty to start anew");
+  if (page_token.empty()) return page;
+  // Only the text that PageToken makes is taken: SimpleAtoi also reads "+1" and " 1".
+  absl::string_view key = page_token;
+  if (absl::ConsumePrefix(&key, absl::StrCat(list, "-")) && absl::SimpleAtoi(key, &page.below) &&
+      page.below > 0 && page_token == PageToken(list, page.below)) {
+    return page;
   }
-  return page;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",
+                 absl::StrCat("page_token is not one of an earlier answer that listed ", list,
+                              ": leave it empty to start anew"));
 }
 
 }  // namespace carillon

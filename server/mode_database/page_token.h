@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 
 namespace carillon {
 
@@ -18,8 +19,14 @@ struct PageRange {
   int64_t below = 0;
 };
 
-/// Returns a range. A `page_size` of 0 means 100. The token is the last key of the previous page,
-/// or empty for the newest rows. Errors: InvalidArgument (INVALID_PAGE).
-absl::StatusOr<PageRange> ParsePage(int page_size, const std::string& page_token);
+/// Returns the token of the page that follows the row with the key `last_key`, which is positive,
+/// in the list named `list`.
+std::string PageToken(absl::string_view list, int64_t last_key);
+
+/// Returns a range of the list named `list`. A `page_size` of 0 means 100. The token is one of
+/// PageToken, or empty for the newest rows. Errors: InvalidArgument (INVALID_PAGE), also for the
+/// token of another list.
+absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
+                                    absl::string_view page_token);
 
 }  // namespace carillon

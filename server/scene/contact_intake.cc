@@ -20,6 +20,9 @@ namespace {
 
 /// Change of an object's speed, m/s, beyond which an impulse is probably a mistake.
 constexpr double kFastSpeed = 100;
+/// The largest distance of a time from zero, s. It includes the seconds since 1970, and doubles
+/// near it are still 2 us apart.
+constexpr double kLargestTimeS = 1e10;
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
@@ -39,8 +42,10 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       pose_times_(settings.step_s) {}
 
 absl::Status ContactIntake::BeginStep(double time_s) {
-  if (!std::isfinite(time_s)) {
-    return Invalid("INVALID_STREAM", absl::StrCat("time_s of step ", step_count_, " is ", time_s));
+  if (!(std::abs(time_s) <= kLargestTimeS)) {
+    return Invalid("INVALID_STREAM",
+                   absl::StrCat("time_s of step ", step_count_, " is ", time_s,
+                                "; give seconds, at most ", kLargestTimeS, " before or after 0"));
   }
   const bool begins = step_count_ == 0 && !settings_.mapping;
   if (!begins && time_s < time_s_) {

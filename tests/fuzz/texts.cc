@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   ParseJobName(text).IgnoreError();
   ParseSceneName(text).IgnoreError();
   ParseObjectName(text).IgnoreError();
-  ParsePage(10, text).IgnoreError();
+  ParsePage("jobs", 10, text).IgnoreError();
   Utf8Prefix(text, 8);
   ParseShare(text);
   ParseBudget(text);

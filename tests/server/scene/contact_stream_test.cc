@@ -299,12 +299,29 @@ TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
   const auto stream = Open(0.01);
   ASSERT_TRUE(stream->intake().BeginStep(1).ok());
   ASSERT_TRUE(stream->intake().BeginStep(1).ok());
-  for (const double time_s : {0.5, std::nan(""), std::numeric_limits<double>::infinity()}) {
+  for (const double time_s : {0.5, std::nan(""), std::numeric_limits<double>::infinity(), 1.1e10}) {
     const absl::Status status = stream->intake().BeginStep(time_s);
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(status.ToString(), HasSubstr("INVALID_STREAM: "));
   }
   EXPECT_EQ(stream->counts().step_count, 2U);
+}
+
+TEST_F(ContactStreamTest, TheFirstTimeIsBounded) {
+  for (const double time_s : {-1e308, -1.1e10, 1.1e10, 1e308}) {
+    const auto stream = Open(0.01);
+    EXPECT_THAT(stream->intake().BeginStep(time_s).ToString(),
+                HasSubstr("give seconds, at most 1e+10 before or after 0"));
+  }
+  for (const double time_s : {-1e10, 1.8e9, 1e10}) {
+    const auto stream = Open(0.01);
+    ASSERT_TRUE(stream->intake().BeginStep(time_s).ok());
+    EXPECT_LT(stream->intake().ahead_s(), 1);
+    stream->intake().Strike(SmallImpulse(1));
+    stream->intake().EndStep();
+    Render(4800);
+    EXPECT_EQ(stream->counts().accepted_count, 1U) << time_s;
+  }
 }
 
 TEST_F(ContactStreamTest, RefusesAStepOrADelayOutOfRange) {
