@@ -24,10 +24,10 @@ absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
                    absl::StrCat("page_size is ", page_size, ": give zero or more"));
   }
   if (page_token.empty()) return page;
-  // Only the text that PageToken makes is taken: SimpleAtoi also reads "+1" and " 1".
-  absl::string_view key = page_token;
-  if (absl::ConsumePrefix(&key, absl::StrCat(list, "-")) && absl::SimpleAtoi(key, &page.below) &&
-      page.below > 0 && page_token == PageToken(list, page.below)) {
+  // The key is written again and compared, because SimpleAtoi also reads "+1" and " 1".
+  const absl::string_view key = absl::StripPrefix(page_token, absl::StrCat(list, "-"));
+  if (absl::SimpleAtoi(key, &page.below) && page.below > 0 &&
+      page_token == PageToken(list, page.below)) {
     return page;
   }
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",

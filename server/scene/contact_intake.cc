@@ -20,8 +20,8 @@ namespace {
 
 /// Change of an object's speed, m/s, beyond which an impulse is probably a mistake.
 constexpr double kFastSpeed = 100;
-/// The largest distance of a time from zero, s. It includes the seconds since 1970, and doubles
-/// near it are still 2 us apart.
+/// The largest magnitude of the time of a step, s. A simulator may send the seconds since 1970, and
+/// neighbouring doubles of this size are 2 us apart.
 constexpr double kLargestTimeS = 1e10;
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {

@@ -95,7 +95,7 @@ class ContactIntake {
   ContactIntake(Scene& scene, EventTarget& target, const IntakeSettings& settings);
 
   /// Begins the step at simulation time `time_s`. Errors: InvalidArgument (INVALID_STREAM: the time
-  /// is not finite or goes back).
+  /// is not finite, over 1e10 s before or after 0, or goes back).
   absl::Status BeginStep(double time_s);
 
   /// Each of these three functions locks the scene's mutex once for all contacts that it is given.

@@ -26,7 +26,8 @@ RUN_S = 60 * float(os.environ.get("CARILLON_TORTURE_MINUTES") or torture.rounds(
 PARTS = 2 if RUN_S < 300 else round(RUN_S / 150)
 # The daemon gives freed memory back every 5 s.
 REST_S = 12
-# Prometheus reads the metrics once in so many samples. Each of the 33 threads that serve them takes memory once.
+# The test reads the metrics as often as a Prometheus server with a scrape interval of 5 s. Each of the 33 threads of
+# the daemon's metrics server allocates its buffers when it answers for the first time.
 SAMPLES_PER_SCRAPE = 5
 # Caches and thread pools fill in the first part. The first connections and renderings of a daemon need these.
 WARM_UP_MIB = 32
@@ -98,7 +99,7 @@ class ChurnTest(torture.ServedTest):
         return {name: value for name, value in self.metrics().items() if name.startswith(wanted) and value != "0"}
 
     def churn(self, model):
-        """Runs the clients for one part, with Prometheus beside them; returns the samples of each second."""
+        """Runs the clients for one part and reads the metrics meanwhile; returns the samples of each second."""
         churn = Churn(self.daemon.server, model)
         samples = []
         try:
