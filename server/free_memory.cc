@@ -2,8 +2,14 @@
 #include "server/free_memory.h"
 
 #include <malloc.h>
+#include <sys/auxv.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <system_error>
 #include <thread>
 
 namespace carillon {
@@ -13,10 +19,29 @@ namespace {
 constexpr int kOwnPagesBytes = 256 << 10;
 /// Free memory that stays at the end of an arena.
 constexpr int kKeptBytes = 1 << 20;
+constexpr char kTunables[] = "GLIBC_TUNABLES";
+constexpr char kThreadCache[] = "glibc.malloc.tcache_count";
+
+/// Does nothing if the thread caches are off already, or if the program cannot be started again.
+void RestartWithoutThreadCaches(char* const* argv) {
+  // The loader hides the variable from a program with privileges of its file, at each start anew.
+  if (getauxval(AT_SECURE) != 0) return;
+  const char* const given = std::getenv(kTunables);
+  std::string tunables = given == nullptr ? "" : given;
+  if (tunables.find(kThreadCache) != std::string::npos) return;
+  if (!tunables.empty()) tunables += ':';
+  tunables.append(kThreadCache).append("=0");
+  setenv(kTunables, tunables.c_str(), 1);
+  std::error_code error;
+  // The system names a process by the last part of this path, which is "exe" in /proc/self/exe.
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error) execv(program.c_str(), argv);
+}
 
 }  // namespace
 
-void BoundFreeMemory() {
+void BoundFreeMemory(char* const* argv) {
+  RestartWithoutThreadCaches(argv);
   mallopt(M_MMAP_THRESHOLD, kOwnPagesBytes);
   mallopt(M_TRIM_THRESHOLD, kKeptBytes);
   mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));

@@ -335,8 +335,7 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
   return Conclude(finding_count, "what the lines above name is lost; all else was kept");
 }
 
-int Main(int argc, const char* const* argv) {
-  BoundFreeMemory();
+int Main(int argc, char* const* argv) {
   ReportUncaughtExceptions();
   SetUpLog();
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
@@ -349,7 +348,10 @@ int Main(int argc, const char* const* argv) {
   }
   SetLogLevel(command->options.log_level);
   if (command->only_check) return CheckOnly(*command);
-  if (command->database_command.empty()) return RunDaemon(*command, read_options);
+  if (command->database_command.empty()) {
+    BoundFreeMemory(argv);
+    return RunDaemon(*command, read_options);
+  }
   const absl::Status status = RunDatabaseCommand(*command);
   return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
 }

@@ -6,7 +6,7 @@
 namespace carillon {
 namespace {
 
-constexpr size_t kMostRememberedClients = 4096;
+constexpr size_t kMostRememberedClients = 256;
 
 }  // namespace
 
