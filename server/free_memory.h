@@ -11,8 +11,8 @@ namespace carillon {
 /// spread small blocks. The thresholds stay fixed here, and each core has one arena.
 ///
 /// By default each thread also keeps up to 448 freed blocks in a cache that nothing empties. Over
-/// hours, these blocks hold back ever more pages. The caches are turned off by GLIBC_TUNABLES, which
-/// glibc reads only at the start of a program. A value that the operator has set for
+/// hours, these blocks hold back ever more pages. The caches are turned off by GLIBC_TUNABLES,
+/// which glibc reads only at the start of a program. A value that the operator has set for
 /// glibc.malloc.tcache_count is kept.
 void BoundFreeMemory(char* const* argv);
 

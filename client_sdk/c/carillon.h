@@ -217,8 +217,9 @@ carillon_code carillon_stop(carillon_scene* scene);
  * carillon_add_object has added. */
 carillon_code carillon_open_stream(carillon_scene* scene, double step_s, carillon_frame frame,
                                    carillon_stream** stream);
-/** Sends a step. It copies the step and never waits for the daemon. A step whose time is not finite
- * or goes back is refused with INVALID_STREAM and not sent, and the stream can go on. */
+/** Sends a step. It copies the step and never waits for the daemon. A step whose time goes back, or
+ * is over 1e10 s before or after 0, is refused with INVALID_STREAM and not sent, and the stream can
+ * go on. */
 carillon_code carillon_send(carillon_stream* stream, const carillon_step* step);
 /** Sends the steps that wait, waits for the daemon's answer, and ends the stream. `report` may be
  * null. If the stream was opened again, the report counts its newest part only, except that it
@@ -233,8 +234,8 @@ carillon_code carillon_create_trace(const char* file, double step_s, carillon_fr
 /** Adds an object, before the first step that names it. `handle` may be null. */
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
-/** Writes a step to the trace. A step whose time is not finite or goes back is refused with
- * INVALID_STREAM and not written, and the trace can be continued. */
+/** Writes a step to the trace. A step whose time goes back, or is over 1e10 s before or after 0, is
+ * refused with INVALID_STREAM and not written, and the trace can be continued. */
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
 /** Completes the file. */
 carillon_code carillon_close_trace(carillon_trace* trace);

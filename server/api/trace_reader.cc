@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/trace_reader.h"
 
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "proto/cpp/step_time.h"
 #include "server/api/contact_conversion.h"
 #include "server/api/object_conversion.h"
 #include "server/api/pose_conversion.h"
@@ -90,16 +92,15 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
 }
 
 absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
-  const bool known_time =
-      clock.first_time_s() >= 0 && clock.first_time_s() <= OfflineRenderer::kMaxTimeS;
+  const bool known_time = std::abs(clock.first_time_s()) <= kLargestStepTimeS;
   const bool known_delay = clock.scheduling_delay_s() >= 0 && clock.scheduling_delay_s() <= 10;
   if (clock.first_frame() % OfflineRenderer::kBlockFrameCount != 0 ||
       clock.first_frame() > kMostFirstFrame || !known_time || !known_delay) {
     return Malformed(absl::StrCat(
         "the header's clock says frame ", clock.first_frame(), " at ", clock.first_time_s(),
         " s and ", clock.scheduling_delay_s(), " s of delay; it must be a multiple of ",
-        OfflineRenderer::kBlockFrameCount, " up to 2^48, 0 to ", OfflineRenderer::kMaxTimeS,
-        " s, and 0 to 10 s, as the daemon answered"));
+        OfflineRenderer::kBlockFrameCount, " up to 2^48, at most ", kLargestStepTimeS,
+        " s before or after 0, and 0 to 10 s, as the daemon answered"));
   }
   settings_->mapping = {.first_frame = clock.first_frame(),
                         .first_time_s = clock.first_time_s(),
@@ -120,11 +121,12 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
 }
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
-  if (!(step.time_s() >= time_s_ && step.time_s() <= OfflineRenderer::kMaxTimeS)) {
+  const double latest_s = settings_->mapping.first_time_s + OfflineRenderer::kMaxDurationS;
+  if (!(step.time_s() >= time_s_ && step.time_s() <= latest_s)) {
     return Malformed(absl::StrCat(
         "a step at ", step.time_s(), " s, where the earliest possible time is ", time_s_,
-        " s; times start at zero or at the clock's first, do not go back, and end by ",
-        OfflineRenderer::kMaxTimeS, " s"));
+        " s; times start at zero or at the clock's first, do not go back, and end ",
+        OfflineRenderer::kMaxDurationS, " s later"));
   }
   time_s_ = step.time_s();
   impulse_count_ += CountRows(step);

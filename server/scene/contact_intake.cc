@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "proto/cpp/step_time.h"
 #include "server/scene/felt_contact.h"
 #include "server/scene/scene_frame.h"
 #include "server/synthesis/bank/acceleration_noise.h"
@@ -20,9 +21,6 @@ namespace {
 
 /// Change of an object's speed, m/s, beyond which an impulse is probably a mistake.
 constexpr double kFastSpeed = 100;
-/// The largest magnitude of the time of a step, s. A simulator may send the seconds since 1970, and
-/// neighbouring doubles of this size are 2 us apart.
-constexpr double kLargestTimeS = 1e10;
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
@@ -42,10 +40,10 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       pose_times_(settings.step_s) {}
 
 absl::Status ContactIntake::BeginStep(double time_s) {
-  if (!(std::abs(time_s) <= kLargestTimeS)) {
-    return Invalid("INVALID_STREAM",
-                   absl::StrCat("time_s of step ", step_count_, " is ", time_s,
-                                "; give seconds, at most ", kLargestTimeS, " before or after 0"));
+  if (!(std::abs(time_s) <= kLargestStepTimeS)) {
+    return Invalid("INVALID_STREAM", absl::StrCat("time_s of step ", step_count_, " is ", time_s,
+                                                  "; give seconds, at most ", kLargestStepTimeS,
+                                                  " before or after 0"));
   }
   const bool begins = step_count_ == 0 && !settings_.mapping;
   if (!begins && time_s < time_s_) {

@@ -48,7 +48,7 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<Blo
   return {.sample_rate_hz = static_cast<double>(settings.sample_rate_hz),
           .step_s = settings.step_s,
           .mapping = settings.mapping,
-          .most_ahead_s = OfflineRenderer::kMaxTimeS - settings.mapping.first_time_s,
+          .most_ahead_s = OfflineRenderer::kMaxDurationS,
           .reading = settings.reading,
           .blows = settings.tells_blows ? &blows : nullptr};
 }

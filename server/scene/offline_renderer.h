@@ -67,8 +67,8 @@ class OfflineRenderer {
  public:
   /// Number of frames in a block that Render makes.
   static constexpr size_t kBlockFrameCount = 128;
-  /// Impulses later than this are rejected.
-  static constexpr double kMaxTimeS = 86400;
+  /// Impulses later than this after the first time of the mapping, seconds, are rejected.
+  static constexpr double kMaxDurationS = 86400;
 
   /// `bodies` and `transfers` must outlive the renderer. `transfers` is null if none are stored.
   /// Errors: InvalidArgument (INVALID_SETTINGS, INVALID_GAIN, INVALID_HEARING, INVALID_POSE).

@@ -5,15 +5,17 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/step_time.h"
 
 namespace carillon::client {
 
 absl::Status CheckStepTime(const StepTime& step, absl::string_view where,
                            absl::string_view another) {
-  if (!std::isfinite(step.time_s)) {
+  if (!(std::abs(step.time_s) <= kLargestStepTimeS)) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                    absl::StrCat(where, "time_s of step ", step.number, " is ", step.time_s,
-                                "; give the simulation time in seconds"));
+                                "; give the simulation time in seconds, at most ",
+                                kLargestStepTimeS, " before or after 0"));
   }
   if (step.number == 0 || step.time_s >= step.previous_s) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",

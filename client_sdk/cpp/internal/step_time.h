@@ -16,10 +16,10 @@ struct StepTime {
   double previous_s = 0;
 };
 
-/// Checks that a time is finite and does not go back. The daemon ends a stream with such a time.
-/// The message of an error begins with `where`, such as "FILE: ", and ends with `another`, the
-/// advice for another run of the simulation, such as "open another stream". Errors: InvalidArgument
-/// (INVALID_STREAM).
+/// Checks that a time is at most kLargestStepTimeS before or after zero and does not go back. The
+/// daemon ends a stream with any other time. The message of an error begins with `where`, such as
+/// "FILE: ", and ends with `another`, the advice for another run of the simulation, such as "open
+/// another stream". Errors: InvalidArgument (INVALID_STREAM).
 absl::Status CheckStepTime(const StepTime& step, absl::string_view where,
                            absl::string_view another);
 

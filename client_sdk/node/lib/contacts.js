@@ -6,6 +6,8 @@ const { CarillonError } = require('./errors');
 const { SCENE_FRAME } = require('./warnings');
 
 // What the arguments mean, for messages.
+// The largest magnitude of the time of a step, as contact.proto says.
+const LARGEST_TIME_S = 1e10;
 const STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
 const ROTATION = 'a quaternion [w, x, y, z] of length 1';
 const MEANINGS = {
@@ -243,9 +245,9 @@ function makeStep(time, own) {
  * of the step before, both in seconds. `repair` says what another run needs.
  */
 function refuseTime(time, number, before, repair) {
-  if (!Number.isFinite(time)) {
+  if (!(Math.abs(time) <= LARGEST_TIME_S)) {
     throw new CarillonError('INVALID_STREAM', `the time of step ${number} is ${time}; give the simulation time in ` +
-      'seconds');
+      `seconds, at most ${LARGEST_TIME_S} before or after 0`);
   }
   if (number && time < before) {
     throw new CarillonError('INVALID_STREAM', `time goes back from ${before} s to ${time} s at step ${number}; ` +

@@ -185,7 +185,7 @@ export class Trace {
   steps: ContactStep[];
   /** Adds an object, which is there from the beginning. Returns its handle. */
   add(model: Model | string, settings?: ObjectSettings & { label?: string }): number;
-  /** Adds a step. Throws CarillonError (INVALID_STREAM) if the time is not finite or goes back. */
+  /** Adds a step. Throws CarillonError (INVALID_STREAM) if the time goes back, or is over 1e10 s before or after 0. */
   step(time: number, content?: StepContent): void;
   records(): Generator<ContactTraceRecord>;
   bytes(): Buffer;
@@ -254,8 +254,8 @@ export class ContactStream {
   /**
    * Sends a step. Await the promise, which gives the network a turn: a loop that never awaits anything sends nothing
    * before it ends, and of more than 4096 steps that wait the oldest are dropped (droppedStepCount). Throws
-   * CarillonError if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time is not finite or
-   * goes back (INVALID_STREAM); such a step is not sent, and the stream can go on.
+   * CarillonError if the stream has failed or has been closed (CONTACT_STREAM_ENDED), and if the time goes back, or is
+   * over 1e10 s before or after 0 (INVALID_STREAM); such a step is not sent, and the stream can go on.
    */
   step(time: number, content?: StepContent): Promise<void>;
   /**

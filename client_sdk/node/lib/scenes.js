@@ -273,9 +273,10 @@ class ContactStream {
 
   /**
    * Sends a step at a simulation time, seconds. Throws CarillonError if the stream has failed or has been closed
-   * (CONTACT_STREAM_ENDED), and if the time is not finite or goes back (INVALID_STREAM); such a step is not sent, and
-   * the stream can go on. The promise gives the network a turn: a loop that never awaits anything sends nothing before
-   * it ends, and of more than 4096 steps that wait the oldest are dropped and counted in `droppedStepCount`.
+   * (CONTACT_STREAM_ENDED), and if the time goes back, or is over 1e10 s before or after 0 (INVALID_STREAM); such a
+   * step is not sent, and the stream can go on. The promise gives the network a turn: a loop that never awaits anything
+   * sends nothing before it ends, and of more than 4096 steps that wait the oldest are dropped and counted in
+   * `droppedStepCount`.
    */
   step(time, content) {
     if (this.isClosing) {

@@ -46,8 +46,8 @@ class Trace {
   }
 
   /**
-   * Adds a step, as ContactStream.step sends one. Throws CarillonError (INVALID_STREAM) and adds nothing if the time is
-   * not finite or goes back.
+   * Adds a step, as ContactStream.step sends one. Throws CarillonError (INVALID_STREAM) and adds nothing if the time
+   * goes back, or is over 1e10 s before or after 0.
    */
   step(time, content) {
     if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {

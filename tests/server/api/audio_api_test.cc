@@ -301,15 +301,23 @@ TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
 
 TEST_F(AudioApi, ATraceThatWasHeardLiveBeginsAtItsFirstStep) {
   Requests heard = Trace();
-  heard[3].mutable_record()->mutable_step()->mutable_impulses(0)->set_duration_s(0);
+  v1::ContactStep& step = *heard[3].mutable_record()->mutable_step();
+  step.mutable_impulses(0)->set_duration_s(0);
   v1::ContactTraceClock& clock = *heard[1].mutable_record()->mutable_header()->mutable_clock();
   clock.set_first_frame(1280);
-  clock.set_first_time_s(0.25);
   clock.set_scheduling_delay_s(0.125);
-  const Rendering rendering = Render(heard);
-  ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
-  const size_t silent = rendering.sound.size() - FromOnset(rendering.sound).size();
-  EXPECT_EQ(silent, (0.5 - 0.25 + 0.125) * 48000 + 1);  // sin(0) is silent
+  std::vector<float> sound;
+  // A simulation may begin before zero, or send the seconds since 1970.
+  for (const double first_time_s : {0.25, -1000.0, 1.75e9}) {
+    clock.set_first_time_s(first_time_s);
+    step.set_time_s(first_time_s + 0.25);
+    const Rendering rendering = Render(heard);
+    ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
+    const size_t silent = rendering.sound.size() - FromOnset(rendering.sound).size();
+    EXPECT_EQ(silent, (0.25 + 0.125) * 48000 + 1);  // sin(0) is silent
+    if (sound.empty()) sound = rendering.sound;
+    EXPECT_EQ(rendering.sound, sound);
+  }
 }
 
 TEST_F(AudioApi, AClockThatNoDaemonCanHaveHadIsRefused) {
@@ -320,8 +328,9 @@ TEST_F(AudioApi, AClockThatNoDaemonCanHaveHadIsRefused) {
   };
   expect([](auto& clock) { clock.set_first_frame(100); });
   expect([](auto& clock) { clock.set_first_frame(uint64_t{1} << 60); });
-  expect([](auto& clock) { clock.set_first_time_s(-1); });
-  expect([](auto& clock) { clock.set_first_time_s(0.6); });  // after the first step
+  expect([](auto& clock) { clock.set_first_time_s(-1.1e10); });
+  expect([](auto& clock) { clock.set_first_time_s(-86400); });  // the step is over a day later
+  expect([](auto& clock) { clock.set_first_time_s(0.6); });     // after the first step
   expect([](auto& clock) { clock.set_scheduling_delay_s(std::nan("")); });
 }
 

@@ -26,9 +26,9 @@ class ContactStream {
 
   /// Queues one simulation step and returns at once. If the stream has ended, returns the error
   /// that ended it, or FAILED_PRECONDITION (CONTACT_STREAM_ENDED) after Finish(). A step whose time
-  /// is not finite or goes back is refused with INVALID_ARGUMENT (INVALID_STREAM) and not sent, and
-  /// the stream can go on. If kMaxQueuedSteps steps are waiting, the stream drops and counts the
-  /// oldest of them, so that the newest are heard.
+  /// goes back, or is over 1e10 s before or after 0, is refused with INVALID_ARGUMENT
+  /// (INVALID_STREAM) and not sent, and the stream can go on. If kMaxQueuedSteps steps are waiting,
+  /// the stream drops and counts the oldest of them, so that the newest are heard.
   virtual absl::Status Send(v1::ContactStep step) = 0;
 
   /// Returns the number of steps that wait for the network.

@@ -25,6 +25,8 @@ PulseShape = Literal["raised_cosine", "gaussian"]
 
 # A duration that is below zero in a column is absent.
 ABSENT = -1.0
+# The largest magnitude of the time of a step, as contact.proto says.
+LARGEST_TIME_S = 1e10
 
 # What the arguments mean, for messages.
 STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame=\"scene\""
@@ -333,9 +335,9 @@ def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:
 def refuse_time(time: float, number: int, before: float, repair: str) -> None:
     """Raises CarillonError (INVALID_STREAM) if step `number` of a run, counted from zero, cannot have the time after
     that of the step before, both in seconds. `repair` says what another run needs."""
-    if not math.isfinite(time):
+    if not abs(time) <= LARGEST_TIME_S:
         raise errors.CarillonError("INVALID_STREAM", f"the time of step {number} is {time}; give the simulation time "
-                                   "in seconds")
+                                   f"in seconds, at most {LARGEST_TIME_S:.0e} before or after 0")
     if number and time < before:
         raise errors.CarillonError("INVALID_STREAM", f"time goes back from {before:.6g} s to {time:.6g} s at step "
                                    f"{number}; {repair}")

@@ -303,8 +303,8 @@ class ContactStream:
 
     def send(self, step: contact_pb2.ContactStep) -> None:
         """Sends a message of contact.proto. Raises CarillonError if the stream has failed or has been closed
-        (CONTACT_STREAM_ENDED), and if the step's time is not finite or goes back (INVALID_STREAM); such a step is not
-        sent, and the stream can go on."""
+        (CONTACT_STREAM_ENDED), and if the step's time goes back, or is over 1e10 s before or after 0 (INVALID_STREAM);
+        such a step is not sent, and the stream can go on."""
         if self._is_closed:
             raise errors.CarillonError("CONTACT_STREAM_ENDED", "this stream has been closed, so that the step would "
                                        "not sound; open another one by Scene.stream")

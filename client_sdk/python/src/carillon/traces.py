@@ -49,7 +49,7 @@ class Trace:
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Adds a step, as ContactStream.step sends one. Raises CarillonError (INVALID_STREAM) and adds nothing if the
-        time is not finite or goes back."""
+        time goes back, or is over 1e10 s before or after 0."""
         if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
             raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
                              "stream: Trace(step=1/240)")
