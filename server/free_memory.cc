@@ -26,6 +26,8 @@ constexpr char kThreadCache[] = "glibc.malloc.tcache_count";
 void RestartWithoutThreadCaches(char* const* argv) {
   // The loader hides the variable from a program with privileges of its file, at each start anew.
   if (getauxval(AT_SECURE) != 0) return;
+  // If the loader was started with this program as its argument, /proc/self/exe is the loader.
+  if (getauxval(AT_BASE) == 0) return;
   const char* const given = std::getenv(kTunables);
   std::string tunables = given == nullptr ? "" : given;
   if (tunables.find(kThreadCache) != std::string::npos) return;

@@ -3,21 +3,23 @@
 
 import os
 import pathlib
+import re
+import subprocess
 import tempfile
 import unittest
 
-from daemon import Daemon
+from daemon import BIN, Daemon
 
 
 class ThreadCachesTest(unittest.TestCase):
-    def tunables(self, given):
+    def tunables(self, given, *prefix):
         """The tunables of a daemon that was started with those given, or with none."""
         environment = {name: value for name, value in os.environ.items() if name != "GLIBC_TUNABLES"}
         with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-            daemon = Daemon(folder, environment=environment | given)
+            daemon = Daemon(folder, environment=environment | given, prefix=prefix)
             try:
                 process = pathlib.Path("/proc", str(daemon.process.pid))
-                self.assertEqual((process / "comm").read_text(), "carillond\n")
+                self.assertEqual((process / "comm").read_text().strip(), pathlib.Path([*prefix, "carillond"][0]).name[:15])
                 # glibc puts zeros in place of the colons between the tunables.
                 variables = (process / "environ").read_text().split("\0")
                 self.assertEqual(daemon.stop(), 0)
@@ -28,6 +30,11 @@ class ThreadCachesTest(unittest.TestCase):
 
     def test_they_are_off(self):
         self.assertEqual(self.tunables({}), ["glibc.malloc.tcache_count=0"])
+
+    def test_a_daemon_that_the_loader_was_told_to_start_starts(self):
+        (loader,) = re.findall(r"\[Requesting program interpreter: (.*)\]", subprocess.run(
+            ["readelf", "--program-headers", BIN / "carillond"], check=True, capture_output=True, text=True).stdout)
+        self.assertEqual(self.tunables({}, loader), [])
 
     def test_other_tunables_are_kept(self):
         self.assertEqual(self.tunables({"GLIBC_TUNABLES": "glibc.malloc.perturb=0"}),
