@@ -15,6 +15,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -56,14 +57,17 @@ constexpr char kVersion[] = CARILLON_VERSION;
 /// Reads the command line and the configuration file once more.
 using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
 
+void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
+
 void AnnounceReady(const ApiServer& server) {
   for (const std::string& address : server.addresses()) {
     std::cout << "listening on " << address << std::endl;
   }
-  sd_notify(0, "READY=1");
+  const int told = sd_notify(0, "READY=1");
+  if (told >= 0) return;
+  LogWarning(absl::StrCat("nobody takes the word that the daemon is ready at NOTIFY_SOCKET: ",
+                          std::system_category().message(-told)));
 }
-
-void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
 
 void LogError(const std::string& line) { spdlog::error("{}", line); }
 

@@ -235,7 +235,8 @@ carillon_code carillon_create_trace(const char* file, double step_s, carillon_fr
 carillon_code carillon_trace_object(carillon_trace* trace, const carillon_object* object,
                                     uint32_t* handle);
 /** Writes a step to the trace. A step whose time goes back, or is over 1e10 s before or after 0, is
- * refused with INVALID_STREAM and not written, and the trace can be continued. */
+ * refused with INVALID_STREAM and not written, and the trace can be continued. A trace can be
+ * rendered if its times are 0 to 86400 s. */
 carillon_code carillon_trace_step(carillon_trace* trace, const carillon_step* step);
 /** Completes the file. */
 carillon_code carillon_close_trace(carillon_trace* trace);

@@ -8,6 +8,7 @@
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "proto/cpp/shortest_decimal.h"
 
 namespace carillon {
 namespace {
@@ -78,8 +79,9 @@ absl::Status AtElement(const absl::Status& status, absl::string_view list, size_
 
 absl::Status AtTime(const absl::Status& status, double time_s) {
   v1::ErrorInfo error = ToErrorInfo(status);
-  error.set_message(absl::StrCat("at ", time_s, " s: ", error.message()));
-  (*error.mutable_metadata())["time_s"] = absl::StrCat(time_s);
+  const std::string time = ShortestDecimal(time_s);
+  error.set_message(absl::StrCat("at ", time, " s: ", error.message()));
+  (*error.mutable_metadata())["time_s"] = time;
   return FromErrorInfo(status.code(), error);
 }
 

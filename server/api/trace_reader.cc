@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/step_time.h"
 #include "server/api/contact_conversion.h"
@@ -92,20 +93,26 @@ absl::Status TraceReader::TakeHeader(const v1::ContactTraceHeader& header) {
 }
 
 absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
-  const bool known_time = std::abs(clock.first_time_s()) <= kLargestStepTimeS;
-  const bool known_delay = clock.scheduling_delay_s() >= 0 && clock.scheduling_delay_s() <= 10;
+  const auto wrong = [](absl::string_view field, double value, absl::string_view limits) {
+    return Malformed(absl::StrCat("the header's clock.", field, " is ", ShortestDecimal(value),
+                                  "; it must be ", limits, ", as the daemon answered"));
+  };
+  const auto first_frame = static_cast<double>(clock.first_frame());
   if (clock.first_frame() % OfflineRenderer::kBlockFrameCount != 0 ||
-      clock.first_frame() > kMostFirstFrame || !known_time || !known_delay) {
-    return Malformed(absl::StrCat(
-        "the header's clock says frame ", clock.first_frame(), " at ", clock.first_time_s(),
-        " s and ", clock.scheduling_delay_s(), " s of delay; it must be a multiple of ",
-        OfflineRenderer::kBlockFrameCount, " up to 2^48, at most ", kLargestStepTimeS,
-        " s before or after 0, and 0 to 10 s, as the daemon answered"));
+      clock.first_frame() > kMostFirstFrame) {
+    return wrong("first_frame", first_frame, "a multiple of 128 up to 2^48");
   }
+  if (!(std::abs(clock.first_time_s()) <= kLargestStepTimeS)) {
+    return wrong("first_time_s", clock.first_time_s(), "at most 1e10 s before or after 0");
+  }
+  if (!(clock.scheduling_delay_s() >= 0 && clock.scheduling_delay_s() <= 10)) {
+    return wrong("scheduling_delay_s", clock.scheduling_delay_s(), "0 to 10 s");
+  }
+  if (clock.stagger() >= kSectionCount) return wrong("stagger", clock.stagger(), "0 to 15");
   settings_->mapping = {.first_frame = clock.first_frame(),
                         .first_time_s = clock.first_time_s(),
                         .delay_s = clock.scheduling_delay_s()};
-  settings_->stagger = clock.stagger() % kSectionCount;
+  settings_->stagger = clock.stagger();
   time_s_ = clock.first_time_s();
   return absl::OkStatus();
 }
@@ -120,14 +127,25 @@ absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
   return renderer_->AddObject(message.handle(), std::move(object.model), object.properties);
 }
 
-absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
-  const double latest_s = settings_->mapping.first_time_s + OfflineRenderer::kMaxDurationS;
-  if (!(step.time_s() >= time_s_ && step.time_s() <= latest_s)) {
+absl::Status TraceReader::CheckTime(double time_s) const {
+  const double first_s = settings_->mapping.first_time_s;
+  const double last_s = first_s + OfflineRenderer::kMaxDurationS;
+  const std::string time = ShortestDecimal(time_s);
+  if (!(time_s >= first_s && time_s <= last_s)) {
     return Malformed(absl::StrCat(
-        "a step at ", step.time_s(), " s, where the earliest possible time is ", time_s_,
-        " s; times start at zero or at the clock's first, do not go back, and end ",
-        OfflineRenderer::kMaxDurationS, " s later"));
+        "step ", step_count_, " is at ", time, " s; times must be ", ShortestDecimal(first_s),
+        " to ", ShortestDecimal(last_s),
+        " s: shift them all, or say in clock.first_time_s of the header where they begin"));
   }
+  if (time_s >= time_s_) return absl::OkStatus();
+  return Malformed(absl::StrCat("time goes back from ", ShortestDecimal(time_s_), " s to ", time,
+                                " s at step ", step_count_,
+                                "; write another trace for another run"));
+}
+
+absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
+  RETURN_IF_ERROR(CheckTime(step.time_s()));
+  ++step_count_;
   time_s_ = step.time_s();
   impulse_count_ += CountRows(step);
   // A pose of the listener gives an event for each object.

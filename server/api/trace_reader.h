@@ -45,13 +45,15 @@ class TraceReader {
   absl::Status TakeClock(const v1::ContactTraceClock& clock);
   absl::Status TakeObject(const v1::ContactTraceObject& message);
   absl::Status TakeStep(const v1::ContactStep& step);
+  absl::Status CheckTime(double time_s) const;
 
   ModeDatabase& database_;
   HeadStore& heads_;
   BodyCache& bodies_;
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // set once the header was read
-  double time_s_ = 0;
+  uint64_t step_count_ = 0;
+  double time_s_ = 0;           // of the step before, or of the beginning
   uint64_t impulse_count_ = 0;  // number of impulses and poses
   uint64_t object_count_ = 0;
 };

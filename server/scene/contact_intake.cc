@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/step_time.h"
 #include "server/scene/felt_contact.h"
@@ -41,15 +42,17 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
 
 absl::Status ContactIntake::BeginStep(double time_s) {
   if (!(std::abs(time_s) <= kLargestStepTimeS)) {
-    return Invalid("INVALID_STREAM", absl::StrCat("time_s of step ", step_count_, " is ", time_s,
-                                                  "; give seconds, at most ", kLargestStepTimeS,
-                                                  " before or after 0"));
+    return Invalid(
+        "INVALID_STREAM",
+        absl::StrCat("time_s of step ", step_count_, " is ", ShortestDecimal(time_s),
+                     "; give seconds, at most ", kLargestStepTimeS, " before or after 0"));
   }
   const bool begins = step_count_ == 0 && !settings_.mapping;
   if (!begins && time_s < time_s_) {
     return Invalid("INVALID_STREAM",
-                   absl::StrCat("time goes back from ", time_s_, " s to ", time_s, " s at step ",
-                                step_count_, "; open another stream for another run"));
+                   absl::StrCat("time goes back from ", ShortestDecimal(time_s_), " s to ",
+                                ShortestDecimal(time_s), " s at step ", step_count_,
+                                "; open another stream for another run"));
   }
   if (begins || settings_.at_once) {
     mapper_.Begin(time_s, target_.frame());
@@ -266,9 +269,14 @@ void ContactIntake::NoteSpeedChange(double speed_m_per_s) {
   if (speed_m_per_s > kFastSpeed) ++findings_.fast_impulse_count;
 }
 
+double ContactIntake::AheadS(double frame) const {
+  return (frame - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
+}
+
 double ContactIntake::ahead_s() const {
   if (step_count_ == 0) return 0;
-  return (FrameOf(time_s_) - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
+  const double frame = FrameOf(time_s_);
+  return CheckAhead(frame).ok() ? AheadS(frame) : 0;
 }
 
 void ContactIntake::NoteZero(const ObjectContact& contact) {
@@ -361,7 +369,7 @@ absl::StatusOr<double> ContactIntake::FrameOfImpulse(double time_offset_s) const
 }
 
 absl::Status ContactIntake::CheckAhead(double frame) const {
-  const double ahead_s = (frame - static_cast<double>(target_.frame())) / settings_.sample_rate_hz;
+  const double ahead_s = AheadS(frame);
   if (ahead_s <= settings_.most_ahead_s + mapping().delay_s) return absl::OkStatus();
   return Invalid(
       "TIME_TOO_FAR_AHEAD",

@@ -173,6 +173,8 @@ class ContactIntake {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
+  /// Returns the time from the sound that is rendered now to a frame, s.
+  double AheadS(double frame) const;
   absl::Status CheckAhead(double frame) const;
   double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }
 

@@ -19,7 +19,8 @@ class ThreadCachesTest(unittest.TestCase):
             daemon = Daemon(folder, environment=environment | given, prefix=prefix)
             try:
                 process = pathlib.Path("/proc", str(daemon.process.pid))
-                self.assertEqual((process / "comm").read_text().strip(), pathlib.Path([*prefix, "carillond"][0]).name[:15])
+                program = pathlib.Path(*prefix[:1] or ["carillond"])
+                self.assertEqual((process / "comm").read_text().strip(), program.name[:15])
                 # glibc puts zeros in place of the colons between the tunables.
                 variables = (process / "environ").read_text().split("\0")
                 self.assertEqual(daemon.stop(), 0)

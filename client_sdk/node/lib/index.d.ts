@@ -185,7 +185,10 @@ export class Trace {
   steps: ContactStep[];
   /** Adds an object, which is there from the beginning. Returns its handle. */
   add(model: Model | string, settings?: ObjectSettings & { label?: string }): number;
-  /** Adds a step. Throws CarillonError (INVALID_STREAM) if the time goes back, or is over 1e10 s before or after 0. */
+  /**
+   * Adds a step. Throws CarillonError (INVALID_STREAM) if the time goes back, or is over 1e10 s before or after 0. A
+   * trace without a clock can be rendered if its times are 0 to 86400 s.
+   */
   step(time: number, content?: StepContent): void;
   records(): Generator<ContactTraceRecord>;
   bytes(): Buffer;

@@ -47,7 +47,8 @@ class Trace {
 
   /**
    * Adds a step, as ContactStream.step sends one. Throws CarillonError (INVALID_STREAM) and adds nothing if the time
-   * goes back, or is over 1e10 s before or after 0.
+   * goes back, or is over 1e10 s before or after 0. A trace without a clock can be rendered if its times are 0 to
+   * 86400 s.
    */
   step(time, content) {
     if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {

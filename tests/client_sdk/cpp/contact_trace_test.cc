@@ -141,6 +141,7 @@ TEST_F(ContactTrace, RefusesAStepWhoseTimeIsTooLargeOrGoesBack) {
   EXPECT_THAT(write(1.5), AllOf(HasSubstr("INVALID_STREAM: "),
                                 HasSubstr("time goes back from 2 s to 1.5 s at step 3;")));
   EXPECT_EQ(write(3), "OK");
+  EXPECT_THAT(write(1e10 + 0.5), HasSubstr("time_s of step 4 is 10000000000.5; "));
   ASSERT_TRUE(writer->Close().ok());
   auto reader = ContactTraceReader::Open(path_);
   ASSERT_TRUE(reader.ok()) << reader.status();

@@ -263,6 +263,8 @@ class RefusalsTest(MessagesTest):
         refused(r"time goes back from 2 s to 1\.5 s at step 2;", 1.5)
         trace.step(2)
         self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
+        trace.step(1795853690.812)
+        refused(r"time goes back from 1795853690\.812 s to 1795853690\.5 s at step 4;", 1795853690.5)
 
     def test_an_empty_name_of_a_model_is_refused_with_the_name_of_the_argument(self):
         for text in ("", "modalModels/", None):

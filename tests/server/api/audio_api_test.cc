@@ -332,6 +332,7 @@ TEST_F(AudioApi, AClockThatNoDaemonCanHaveHadIsRefused) {
   expect([](auto& clock) { clock.set_first_time_s(-86400); });  // the step is over a day later
   expect([](auto& clock) { clock.set_first_time_s(0.6); });     // after the first step
   expect([](auto& clock) { clock.set_scheduling_delay_s(std::nan("")); });
+  expect([](auto& clock) { clock.set_stagger(16); });
 }
 
 TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {

@@ -344,6 +344,8 @@ TEST_F(ReadingTest, HowFarASimulationRunsAheadOfTheSoundIsKnown) {
   const double delay_s = intake.ahead_s();
   ASSERT_TRUE(intake.BeginStep(4).ok());
   EXPECT_NEAR(intake.ahead_s(), delay_s + 3, 1e-9);
+  ASSERT_TRUE(intake.BeginStep(86400).ok());
+  EXPECT_EQ(intake.ahead_s(), 0) << "though the step never sounds";
 }
 
 TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefused) {

@@ -339,7 +339,7 @@ def refuse_time(time: float, number: int, before: float, repair: str) -> None:
         raise errors.CarillonError("INVALID_STREAM", f"the time of step {number} is {time}; give the simulation time "
                                    f"in seconds, at most {LARGEST_TIME_S:.0e} before or after 0")
     if number and time < before:
-        raise errors.CarillonError("INVALID_STREAM", f"time goes back from {before:.6g} s to {time:.6g} s at step "
+        raise errors.CarillonError("INVALID_STREAM", f"time goes back from {before:.15g} s to {time:.15g} s at step "
                                    f"{number}; {repair}")
 
 

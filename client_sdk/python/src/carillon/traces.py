@@ -49,7 +49,8 @@ class Trace:
              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Adds a step, as ContactStream.step sends one. Raises CarillonError (INVALID_STREAM) and adds nothing if the
-        time goes back, or is over 1e10 s before or after 0."""
+        time goes back, or is over 1e10 s before or after 0. A trace without a clock can be rendered if its times are 0
+        to 86400 s."""
         if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
             raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
                              "stream: Trace(step=1/240)")
