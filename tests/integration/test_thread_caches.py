@@ -12,11 +12,11 @@ from daemon import BIN, Daemon
 
 
 class ThreadCachesTest(unittest.TestCase):
-    def tunables(self, given, *prefix):
+    def tunables(self, given, *arguments, prefix=()):
         """The tunables of a daemon that was started with those given, or with none."""
         environment = {name: value for name, value in os.environ.items() if name != "GLIBC_TUNABLES"}
         with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-            daemon = Daemon(folder, environment=environment | given, prefix=prefix)
+            daemon = Daemon(folder, *arguments, environment=environment | given, prefix=prefix)
             try:
                 process = pathlib.Path("/proc", str(daemon.process.pid))
                 program = pathlib.Path(*prefix[:1] or ["carillond"])
@@ -35,7 +35,7 @@ class ThreadCachesTest(unittest.TestCase):
     def test_a_daemon_that_the_loader_was_told_to_start_starts(self):
         (loader,) = re.findall(r"\[Requesting program interpreter: (.*)\]", subprocess.run(
             ["readelf", "--program-headers", BIN / "carillond"], check=True, capture_output=True, text=True).stdout)
-        self.assertEqual(self.tunables({}, loader), [])
+        self.assertEqual(self.tunables({}, "--precompute", BIN / "carillon-precompute", prefix=[loader]), [])
 
     def test_other_tunables_are_kept(self):
         self.assertEqual(self.tunables({"GLIBC_TUNABLES": "glibc.malloc.perturb=0"}),
