@@ -22,7 +22,8 @@ constexpr int kKeptBytes = 1 << 20;
 constexpr char kTunables[] = "GLIBC_TUNABLES";
 constexpr char kThreadCache[] = "glibc.malloc.tcache_count";
 
-/// Does nothing if the thread caches are off already, or if the program cannot be started again.
+/// Executes the program of this process once more, with the thread caches off. The function returns
+/// if GLIBC_TUNABLES has a size for them already, or if the program cannot be executed.
 void RestartWithoutThreadCaches(char* const* argv) {
   // The loader hides the variable from a program with privileges of its file, at each start anew.
   if (getauxval(AT_SECURE) != 0) return;

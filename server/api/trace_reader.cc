@@ -131,21 +131,20 @@ absl::Status TraceReader::CheckTime(double time_s) const {
   const double first_s = settings_->mapping.first_time_s;
   const double last_s = first_s + OfflineRenderer::kMaxDurationS;
   const std::string time = ShortestDecimal(time_s);
+  const uint64_t step = renderer_->intake().step_count();
   if (!(time_s >= first_s && time_s <= last_s)) {
     return Malformed(absl::StrCat(
-        "step ", step_count_, " is at ", time, " s; times must be ", ShortestDecimal(first_s),
-        " to ", ShortestDecimal(last_s),
+        "step ", step, " is at ", time, " s; times must be ", ShortestDecimal(first_s), " to ",
+        ShortestDecimal(last_s),
         " s: shift them all, or say in clock.first_time_s of the header where they begin"));
   }
   if (time_s >= time_s_) return absl::OkStatus();
   return Malformed(absl::StrCat("time goes back from ", ShortestDecimal(time_s_), " s to ", time,
-                                " s at step ", step_count_,
-                                "; write another trace for another run"));
+                                " s at step ", step, "; write another trace for another run"));
 }
 
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   RETURN_IF_ERROR(CheckTime(step.time_s()));
-  ++step_count_;
   time_s_ = step.time_s();
   impulse_count_ += CountRows(step);
   // A pose of the listener gives an event for each object.

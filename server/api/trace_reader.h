@@ -52,9 +52,8 @@ class TraceReader {
   BodyCache& bodies_;
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // set once the header was read
-  uint64_t step_count_ = 0;
-  double time_s_ = 0;           // of the step before, or of the beginning
-  uint64_t impulse_count_ = 0;  // number of impulses and poses
+  double time_s_ = 0;                          // the earliest time that the next step may have
+  uint64_t impulse_count_ = 0;                 // number of impulses and poses
   uint64_t object_count_ = 0;
 };
 

@@ -128,8 +128,8 @@ class ContactIntake {
   /// Number of times that simulation time was mapped anew.
   uint64_t remap_count() const { return mapper_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
-  /// Returns the time from the target's frame to the newest step's, seconds, or zero before the
-  /// first step.
+  /// Returns the time from the target's frame to the newest step's, seconds. It is zero before the
+  /// first step, and if the newest step is too far ahead to sound.
   double ahead_s() const;
   /// Number of impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
@@ -172,9 +172,9 @@ class ContactIntake {
   void AddBlow(const MixerEvent& event, BlowRecord blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
-  /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
-  /// Returns the time from the sound that is rendered now to a frame, s.
+  /// Returns the time from the target's frame to `frame`, seconds.
   double AheadS(double frame) const;
+  /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
   absl::Status CheckAhead(double frame) const;
   double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }
 

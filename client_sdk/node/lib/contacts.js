@@ -5,9 +5,10 @@ const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple,
 const { CarillonError } = require('./errors');
 const { SCENE_FRAME } = require('./warnings');
 
-// What the arguments mean, for messages.
 // The largest magnitude of the time of a step, as contact.proto says.
 const LARGEST_TIME_S = 1e10;
+
+// What the arguments mean, for messages.
 const STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
 const ROTATION = 'a quaternion [w, x, y, z] of length 1';
 const MEANINGS = {
