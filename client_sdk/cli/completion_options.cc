@@ -14,8 +14,8 @@
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "client_sdk/cli/name_options.h"
-#include "proto/cpp/manual_page.h"
 #include "proto/cpp/near_names.h"
+#include "proto/cpp/program/manual_page.h"
 
 namespace carillon::cli {
 namespace {

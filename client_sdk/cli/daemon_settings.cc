@@ -16,8 +16,8 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/daemon_process.h"
-#include "proto/cpp/child_process.h"
-#include "proto/cpp/escaped_text.h"
+#include "proto/cpp/program/child_process.h"
+#include "proto/cpp/program/escaped_text.h"
 
 namespace carillon::cli {
 namespace {

@@ -22,8 +22,8 @@
 #include "client_sdk/cli/findings.h"
 #include "client_sdk/cli/health.h"
 #include "client_sdk/cli/output.h"
-#include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/child_process.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {

@@ -13,8 +13,8 @@
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/job_progress.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/near_names.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {

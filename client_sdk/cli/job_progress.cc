@@ -14,7 +14,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/output.h"
-#include "proto/cpp/escaped_text.h"
+#include "proto/cpp/program/escaped_text.h"
 
 namespace carillon::cli {
 namespace {

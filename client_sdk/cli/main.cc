@@ -28,7 +28,7 @@
 #include "client_sdk/cli/render_options.h"
 #include "client_sdk/cli/sound_options.h"
 #include "client_sdk/cli/value_options.h"
-#include "proto/cpp/manual_page.h"
+#include "proto/cpp/program/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
 
 namespace carillon::cli {

@@ -3,9 +3,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/loss_factor.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {

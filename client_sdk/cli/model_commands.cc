@@ -15,10 +15,10 @@
 #include "client_sdk/cli/job_progress.h"
 #include "client_sdk/cli/output.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/escaped_text.h"
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_file.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {

@@ -18,8 +18,8 @@
 #include "client_sdk/cli/quantity.h"
 #include "client_sdk/cli/value_options.h"
 #include "proto/cpp/mesh_format.h"
-#include "proto/cpp/parsed_option.h"
-#include "proto/cpp/settings_options.h"
+#include "proto/cpp/program/parsed_option.h"
+#include "proto/cpp/program/settings_options.h"
 
 namespace carillon::cli {
 namespace {

@@ -18,8 +18,8 @@
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/example_bodies.h"
 #include "client_sdk/cli/output.h"
-#include "proto/cpp/manual_page.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/program/manual_page.h"
 #include "proto/cpp/striker_catalogue.h"
 
 namespace carillon::cli {

@@ -20,8 +20,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands.h"
-#include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/child_process.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {

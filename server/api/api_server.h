@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/api/tls_files.h"
+#include "server/api/edge/tls_files.h"
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/decomposition/decomposition_queue.h"

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "absl/strings/match.h"
-#include "server/api/flood_guard.h"
-#include "server/api/reflection_service.h"
-#include "server/api/server_service.h"
+#include "server/api/edge/client_limits.h"
+#include "server/api/edge/flood_guard.h"
+#include "server/api/services/reflection_service.h"
 
 namespace carillon {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "absl/types/span.h"
-#include "server/api/connection_gate.h"
-#include "server/api/idle_calls.h"
+#include "server/api/edge/connection_gate.h"
+#include "server/api/edge/idle_calls.h"
 #include "server/base/clock.h"
 
 namespace carillon {
@@ -35,8 +35,6 @@ class GrpcServers {
 
   /// Memory that gRPC may take for the connections over Unix sockets.
   static constexpr size_t kUnixMemoryBytes = size_t{256} << 20U;
-  /// Memory that gRPC may take for the connections of one group of addresses.
-  static constexpr size_t kTcpMemoryBytes = size_t{96} << 20U;
 
   /// Open calls of reflection are added to `idle_calls`, which must outlive this as `clock` must.
   GrpcServers(IdleCalls& idle_calls, const Clock& clock);

@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/cpp/child_process.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/child_process.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/descriptor_message.h"
 #include "server/audio_device/device_report.h"

@@ -11,7 +11,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
-#include "proto/cpp/child_process.h"
+#include "proto/cpp/program/child_process.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/worker_events.h"
 

@@ -9,7 +9,7 @@
 #include <cerrno>
 #include <chrono>
 
-#include "proto/cpp/child_process.h"
+#include "proto/cpp/program/child_process.h"
 
 namespace carillon {
 namespace {

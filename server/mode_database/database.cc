@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/mode_database/database_replacement.h"
+#include "server/mode_database/maintenance/database_replacement.h"
 #include "server/mode_database/schema.h"
 
 namespace carillon {

@@ -5,8 +5,8 @@
 
 #include "proto/cpp/status_macros.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/database_admin.h"
 #include "server/mode_database/database_files.h"
+#include "server/mode_database/maintenance/database_admin.h"
 
 namespace carillon {
 

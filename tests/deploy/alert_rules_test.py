@@ -10,7 +10,7 @@ import alert_rules
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RULES = ROOT / "deploy/prometheus/alerts.yml"
-METRICS = ROOT / "server/daemon_metrics.cc"
+METRICS = ROOT / "server/daemon/daemon_metrics.cc"
 DAY = 86400
 GIB = 2.0**30
 

@@ -33,10 +33,10 @@ class Includes(TreeTest):
     def test_a_header_of_an_include_root_belongs_to_the_room_that_holds_it(self):
         self.write("client_sdk/cpp/include/carillon/client.h", '#include <grpcpp/channel.h>\n')
         self.write("client_sdk/cli/main.cc", '#include "carillon/client.h"\n')
-        self.write("server/main.cc", '#include "carillon/client.h"\n')
+        self.write("server/daemon/main.cc", '#include "carillon/client.h"\n')
         self.assert_found(
             check_includes.check(self.root),
-            "server/main.cc:1: server may not include client_sdk/cpp/include/carillon/client.h",
+            "server/daemon/main.cc:1: server may not include client_sdk/cpp/include/carillon/client.h",
             "grpc (grpcpp/channel.h) may appear in")
 
     def test_the_inside_of_the_sdk_is_refused_to_its_users(self):
@@ -46,7 +46,7 @@ class Includes(TreeTest):
 
     def test_grpc_in_precompute_is_refused_generated_or_not(self):
         self.assert_found(
-            self.check_file("precompute/decompose.cc", "<grpcpp/grpcpp.h>",
+            self.check_file("precompute/pipeline/decompose.cc", "<grpcpp/grpcpp.h>",
                             '"carillon/v1/audio_service.grpc.pb.h"'),
             "grpc (grpcpp/grpcpp.h) may appear in",
             "grpc (carillon/v1/audio_service.grpc.pb.h) may appear in")

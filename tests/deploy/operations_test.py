@@ -15,7 +15,7 @@ MOST_EXPOSURE = 2.0
 
 
 def metrics_of_daemon():
-    text = (ROOT / "server/daemon_metrics.cc").read_text()
+    text = (ROOT / "server/daemon/daemon_metrics.cc").read_text()
     return set(re.findall(r'"((?:carillon|process)_[a-z_]+)"', text))
 
 

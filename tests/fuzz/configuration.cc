@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/options.h"
+#include "server/daemon/options.h"
 #include "tests/fuzz/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

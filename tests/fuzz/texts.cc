@@ -5,8 +5,8 @@
 #include <string>
 
 #include "proto/cpp/fixture_text.h"
-#include "proto/cpp/quantity.h"
-#include "server/api/resource_name.h"
+#include "proto/cpp/program/quantity.h"
+#include "server/api/convert/resource_name.h"
 #include "server/mode_database/page_token.h"
 #include "server/mode_database/utf8_prefix.h"
 

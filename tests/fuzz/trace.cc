@@ -7,7 +7,7 @@
 #include <array>
 #include <cstdint>
 
-#include "server/api/trace_reader.h"
+#include "server/api/convert/trace_reader.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/scene/small_model.h"
 

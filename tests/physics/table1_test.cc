@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "precompute/fem/elastic_constants.h"
-#include "precompute/intended_use.h"
+#include "precompute/pipeline/intended_use.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/precompute/test_meshes.h"
 

@@ -17,12 +17,12 @@
 #include <string>
 #include <vector>
 
+#include "precompute/codec/read_modal_model.h"
 #include "precompute/radiation/far_pattern.h"
 #include "precompute/radiation/solve_radiation.h"
 #include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/surface_levels.h"
 #include "precompute/radiation/transfer.h"
-#include "precompute/read_modal_model.h"
 #include "tests/precompute/radiation/dense_equation.h"
 
 namespace carillon::precompute {

@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "server/api/listen_address.h"
+#include "server/api/edge/listen_address.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "tests/server/api/served_daemon.h"
 

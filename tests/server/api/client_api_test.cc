@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/api/client_limits.h"
+#include "server/api/edge/client_limits.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {

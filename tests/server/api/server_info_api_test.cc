@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/api/server_service.h"
+#include "server/api/services/server_service.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {

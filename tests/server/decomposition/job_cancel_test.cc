@@ -3,7 +3,7 @@
 // Who ends a job that several clients have asked for.
 #include "absl/strings/str_cat.h"
 #include "server/decomposition/wanted_job.h"
-#include "server/mode_database/database_admin.h"
+#include "server/mode_database/maintenance/database_admin.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {

@@ -16,7 +16,7 @@
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/database_keeper.h"
+#include "server/mode_database/maintenance/database_keeper.h"
 #include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/sample_model.h"

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "server/mode_database/database_admin.h"
+#include "server/mode_database/maintenance/database_admin.h"
 #include "server/mode_database/mode_database.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/mode_database/sample_transfer.h"

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+#include "precompute/pipeline/decomposition_observer.h"
+#include "precompute/pipeline/phase_clock.h"
+#include "precompute/program/remaining_time.h"
+
+namespace carillon::precompute {
+
+/// Keeps the state of a decomposition and shows it at a steady rate from a thread of its own, so
+/// that a user sees that a long factorization is still running.
+class ProgressReporter : public DecompositionObserver {
+ public:
+  /// The reporter's thread calls `show` every `interval` and once at the end.
+  ProgressReporter(std::function<void(const v1::Progress&)> show,
+                   std::chrono::milliseconds interval);
+  ~ProgressReporter() override;
+
+  void OnProgress(v1::Phase phase, double fraction) override;
+  void OnRound(const RoundForecast& forecast) override;
+  void OnPlan(const std::vector<PlannedStep>& steps) override;
+  void OnExtent(double extent_m) override;
+  void OnMesh(size_t node_count) override;
+  void OnModes(size_t mode_count) override;
+
+  /// Shows the last state and ends the thread.
+  void Stop();
+
+  v1::Progress state() const;
+  /// May be called after Stop only.
+  const PhaseClock& clock() const { return clock_; }
+
+ private:
+  void Run();
+  double Now() const;
+  /// Updates the fraction and the remaining time. The caller has locked mutex_.
+  void Estimate();
+
+  std::function<void(const v1::Progress&)> show_;
+  std::chrono::milliseconds interval_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  v1::Progress state_;
+  bool stopping_ = false;
+  PhaseClock clock_;
+  double begun_s_ = PhaseClock::Now().seconds;
+  RemainingTime remaining_;
+  bool counted_ = false;  ///< whether the number of modes is known
+  std::thread thread_;
+};
+
+}  // namespace carillon::precompute

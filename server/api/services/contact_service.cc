@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/services/contact_service.h"
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/call/status_conversion.h"
+#include "server/api/call/stream_call.h"
+#include "server/api/convert/contact_conversion.h"
+#include "server/api/convert/resource_name.h"
+#include "server/base/mutex.h"
+
+namespace carillon {
+namespace {
+
+/// Half of the period of answers that the contract promises.
+constexpr std::chrono::milliseconds kAnswerPeriod(500);
+/// Time between two looks whether the mixer has taken all impulses, which takes a block. Waiting
+/// ends after kMostSettlePeriods, in case the mixer does not render at all.
+constexpr std::chrono::milliseconds kSettlePeriod(2);
+constexpr int kMostSettlePeriods = 250;
+/// Greatest size of a message, and greatest number of rows of a step, that gRPC's thread takes at
+/// once. gRPC has few threads, and all calls wait while these are busy. Parsing a message takes up
+/// to 60 ns for each of its bytes, and a row takes up to 6 us.
+constexpr size_t kMostBytesAtOnce = size_t{24} << 10;
+constexpr size_t kMostRowsAtOnce = 256;
+/// The same for a client that has used up its time on gRPC's threads. This message takes no longer
+/// than gRPC's own work for it.
+constexpr size_t kFewBytes = size_t{1} << 10;
+constexpr size_t kFewRows = 16;
+
+/// One contact stream. Requests are read one at a time, so only one thread at a time uses
+/// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
+class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
+ public:
+  ContactCall(const ContactContext& daemon, ContactClients& clients,
+              const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
+      : StreamWriter(nullptr),
+        daemon_(daemon),
+        recorders_(clients.recorders),
+        context_(context),
+        caller_(std::move(caller)),
+        place_(std::move(place)),
+        budget_(clients.budgets.Of(caller_.client)) {
+    StartWriting();
+    StartReading();
+  }
+  ~ContactCall() override { recording_.End(); }
+
+ private:
+  absl::Status Take(const v1::StreamContactsRequest& request) override {
+    switch (request.request_case()) {
+      case v1::StreamContactsRequest::kStart:
+        return Open(request.start());
+      case v1::StreamContactsRequest::kStep:
+        return Step(request.step());
+      case v1::StreamContactsRequest::kSteps:
+        for (const v1::ContactStep& step : request.steps().steps()) RETURN_IF_ERROR(Step(step));
+        return absl::OkStatus();
+      default:
+        return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                       "a request is neither start nor step nor steps");
+    }
+  }
+
+  bool gone() const override { return context_.IsCancelled(); }
+
+  void RunReading(size_t byte_count, std::function<void()> step) override {
+    if (byte_count <= kFewBytes) {
+      turn_ = Turn::kFree;
+      return step();
+    }
+    if (byte_count <= kMostBytesAtOnce && budget_->Allows(daemon_.clock.Monotonic())) {
+      turn_ = Turn::kPaid;
+      return Pay(step);
+    }
+    if (!budget_->Hold(byte_count)) {
+      return Refuse(
+          Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                  "large messages of this client, of more than 64 MiB together, wait to be "
+                  "taken: send steps with fewer contacts, or more slowly"));
+    }
+    RunInPool([budget = budget_, byte_count, step = std::move(step)] {
+      budget->Release(byte_count);
+      step();
+    });
+  }
+
+  void RunTaking(const v1::StreamContactsRequest& request,
+                 const std::function<void()>& step) override {
+    // A step takes time even without rows.
+    size_t row_count =
+        CountRowsOf(request.step()) + static_cast<size_t>(request.steps().steps_size());
+    for (const v1::ContactStep& one : request.steps().steps()) row_count += CountRowsOf(one);
+    if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
+    if (row_count > kMostRowsAtOnce) return RunInPool(step);
+    if (turn_ == Turn::kPaid) return step();
+    if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(step);
+    Pay(step);
+  }
+
+  /// Returns the number of rows, in which each object that hears a move of the listener counts.
+  size_t CountRowsOf(const v1::ContactStep& step) const {
+    return CountRows(step) + (stream_ && step.has_listener() ? stream_->object_count() : 0);
+  }
+
+  /// Runs the step on this thread, which is one of gRPC's, and spends the client's budget.
+  void Pay(const std::function<void()>& step) {
+    Clock& clock = daemon_.clock;
+    const std::shared_ptr<StepBudget> budget = budget_;  // the call may be deleted during the step
+    const std::chrono::nanoseconds begin = clock.Monotonic();
+    step();
+    budget->Spend(clock.Monotonic() - begin);
+  }
+
+  void RunInPool(std::function<void()> step) {
+    turn_ = Turn::kInPool;
+    daemon_.large_steps.Run(caller_.client, std::move(step));
+  }
+
+  void AllRead() override {
+    if (stream_) stream_->intake().Finish();
+    recording_.End();
+    daemon_.reception.pool.Run([this] { Settle(); });
+  }
+
+  void Refuse(const absl::Status& status) override { CloseWith(status); }
+
+  /// The reading half ends a cancelled call, because reading fails when the client has gone.
+  bool ends_by_cancellation() const override { return false; }
+
+  absl::Status Open(const v1::ContactStreamStart& start) {
+    if (stream_) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                     "the stream was started twice; open another call for another scene");
+    }
+    ASSIGN_OR_RETURN(const uint64_t scene, daemon_.owners.Parse(context_, caller_, start.scene()));
+    ContactStreamSettings settings;
+    settings.step_s = start.step_s();
+    if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
+    settings.at_once = start.at_once();
+    settings.reading = ToContactReading(start.frame(), start.pulse_shape());
+    ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
+    recording_ = StreamRecording(daemon_.scenes, scene, start, recorders_.Take(scene));
+    Answer();
+    return absl::OkStatus();
+  }
+
+  absl::Status Step(const v1::ContactStep& step) {
+    if (!stream_) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
+                     "the first request of a contact stream must be start");
+    }
+    if (recording_.active()) recording_.BeginStep();
+    RETURN_IF_ERROR(ReadStep(step, stream_->intake()));
+    if (recording_.active()) recording_.AddStep(step, stream_->intake().mapping());
+    const bool first = stream_->counts().step_count == 1;
+    if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
+    return absl::OkStatus();
+  }
+
+  /// Waits until the mixer has taken all impulses, so that the last counts are final.
+  void Settle() {
+    for (int i = 0; stream_ && !stream_->settled() && i < kMostSettlePeriods; ++i) {
+      daemon_.clock.SleepUntil(daemon_.clock.Monotonic() + kSettlePeriod);
+    }
+    if (stream_) Answer();
+    CloseWith(absl::OkStatus());
+  }
+
+  void Answer() {
+    answer_due_ = daemon_.clock.Monotonic() + kAnswerPeriod;
+    v1::StreamContactsResponse answer = Snapshot();
+    {
+      const MutexLock lock(&mutex_);
+      waiting_ = std::move(answer);
+    }
+    Wake();
+  }
+
+  /// Ends the call when the answer that waits has been sent.
+  void CloseWith(const absl::Status& status) {
+    {
+      const MutexLock lock(&mutex_);
+      end_ = status;
+    }
+    Wake();
+  }
+
+  absl::StatusOr<Supply> Fill(v1::StreamContactsResponse& response) override {
+    const MutexLock lock(&mutex_);
+    if (waiting_) {
+      response = *std::exchange(waiting_, std::nullopt);
+      return Supply::kMessage;
+    }
+    if (!end_) return Supply::kLater;
+    RETURN_IF_ERROR(*end_);
+    return Supply::kEnd;
+  }
+
+  v1::StreamContactsResponse Snapshot() const {
+    const ContactCounts counts = stream_->counts();
+    v1::StreamContactsResponse answer;
+    answer.set_scheduling_delay_s(stream_->scheduling_delay_s());
+    answer.set_output_latency_s(daemon_.output.state().latency_s);
+    if (const auto frame = stream_->first_frame()) answer.set_first_frame(*frame);
+    answer.set_step_count(counts.step_count);
+    answer.set_accepted_count(counts.accepted_count);
+    answer.set_late_count(counts.late_count);
+    answer.set_dropped_count(counts.dropped_count);
+    answer.set_remap_count(counts.remap_count);
+    answer.set_ahead_s(stream_->ahead_s());
+    answer.set_rejected_count(counts.rejected_count);
+    if (!stream_->last_rejection().ok()) {
+      *answer.mutable_last_rejection() = ToLegibleErrorInfo(stream_->last_rejection());
+    }
+    *answer.mutable_findings() = ToProto(stream_->findings());
+    return answer;
+  }
+
+  /// Where the request that was read last is taken.
+  enum class Turn {
+    kFree,    ///< on gRPC's thread, without spending the budget
+    kPaid,    ///< on gRPC's thread, by Pay
+    kInPool,  ///< on a thread that large_steps gives
+  };
+
+  const ContactContext daemon_;
+  TraceRecorders& recorders_;
+  Turn turn_ = Turn::kFree;
+  StreamRecording recording_;
+  const grpc::CallbackServerContext& context_;
+  const Principal caller_;
+  const ClientPlace place_;
+  const std::shared_ptr<StepBudget> budget_;
+  std::unique_ptr<ContactStream> stream_;
+  std::chrono::nanoseconds answer_due_{0};
+  Mutex mutex_;
+  std::optional<v1::StreamContactsResponse> waiting_ ABSL_GUARDED_BY(mutex_);
+  std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
+};
+
+/// Sends the records of a stream as they are made.
+class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
+ public:
+  RecordCall(TraceRecorders& recorders, const absl::StatusOr<uint64_t>& scene, ClientPlace place)
+      : StreamWriter(nullptr), place_(std::move(place)), status_(scene.status()) {
+    recorder_ = std::make_shared<TraceRecorder>(scene.value_or(0), [this] { Wake(); });
+    if (status_.ok()) recorders.Add(recorder_);
+    StartWriting();
+  }
+  /// The stream may hold the recorder longer than this call lives.
+  ~RecordCall() override { recorder_->Leave(); }
+
+ private:
+  absl::StatusOr<Supply> Fill(v1::RecordContactsResponse& response) override {
+    RETURN_IF_ERROR(status_);
+    if (!std::exchange(begun_, true)) return Supply::kMessage;
+    if (recorder_->overflowed()) {
+      return Refusal(absl::StatusCode::kDataLoss, "RECORDING_TOO_SLOW",
+                     "steps of the stream came faster than the client read them, and over 65,536 "
+                     "records or 16 MiB waited: record again, and write to a faster disk or over a "
+                     "faster network");
+    }
+    const bool ended = recorder_->ended();
+    if (recorder_->TryTake(*response.mutable_record())) return Supply::kMessage;
+    return ended ? Supply::kEnd : Supply::kLater;
+  }
+
+  const ClientPlace place_;
+  const absl::Status status_;
+  std::shared_ptr<TraceRecorder> recorder_;
+  bool begun_ = false;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordContacts(
+    grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) {
+  using Reactor = grpc::ServerWriteReactor<v1::RecordContactsResponse>;
+  const auto make = [&](const Principal& caller, ClientPlace place) -> Reactor* {
+    absl::StatusOr<uint64_t> scene = daemon_.owners.Parse(*context, caller, request->scene());
+    if (scene.ok()) {
+      const absl::Status found = daemon_.scenes.BusOf(*scene).status();
+      if (!found.ok()) scene = found;
+    }
+    return new RecordCall(clients_.recorders, scene, std::move(place));
+  };
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kListener}, make);
+}
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>*
+ContactService::StreamContactsRaw(grpc::CallbackServerContext* context) {
+  using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>;
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kContactStream},
+              [&](const Principal& caller, ClientPlace place) -> Reactor* {
+                return new ContactCall(daemon_, clients_, *context, caller, std::move(place));
+              });
+}
+
+}  // namespace carillon

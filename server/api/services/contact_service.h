@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "carillon/v1/contact_service.grpc.pb.h"
+#include "server/api/call/fair_turns.h"
+#include "server/api/call/raw_service.h"
+#include "server/api/call/reception.h"
+#include "server/api/call/step_budget.h"
+#include "server/api/edge/scene_owners.h"
+#include "server/api/services/trace_recorders.h"
+#include "server/base/clock.h"
+#include "server/live_output/live_output.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+
+/// The parts of the daemon that a contact stream uses.
+struct ContactContext {
+  SceneRegistry& scenes;
+  LiveOutput& output;
+  Clock& clock;
+  SceneOwners& owners;
+  Reception reception;
+  FairTurns& large_steps;  ///< takes the steps that keep a thread busy for long
+};
+
+/// The parts of the service that several of its calls share.
+struct ContactClients {
+  TraceRecorders recorders{};
+  StepBudgets budgets{};
+};
+
+/// carillon.v1.ContactService. The objects that the constructor gets by reference must outlive the
+/// service.
+class ContactService final : public RawService<v1::ContactService> {
+ public:
+  explicit ContactService(const ContactContext& daemon) : daemon_(daemon) {
+    ReadRaw("StreamContacts", &ContactService::StreamContactsRaw);
+  }
+
+  grpc::ServerWriteReactor<v1::RecordContactsResponse>* RecordContacts(
+      grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) override;
+
+ private:
+  grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>* StreamContactsRaw(
+      grpc::CallbackServerContext* context);
+
+  const ContactContext daemon_;
+  ContactClients clients_;
+};
+
+}  // namespace carillon

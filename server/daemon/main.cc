@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// carillond: puts the rooms of the daemon together.
+
+#include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/api_server.h"
+#include "server/api/edge/client_limits.h"
+#include "server/base/clock.h"
+#include "server/daemon/daemon_log.h"
+#include "server/daemon/daemon_metrics.h"
+#include "server/daemon/data_directory.h"
+#include "server/daemon/free_memory.h"
+#include "server/daemon/memory_limits.h"
+#include "server/daemon/options.h"
+#include "server/daemon/room_settings.h"
+#include "server/daemon/stop_signals.h"
+#include "server/daemon/watchdog.h"
+#include "server/decomposition/decomposition_queue.h"
+#include "server/decomposition/local_executor.h"
+#include "server/decomposition/remote_runs.h"
+#include "server/decomposition/slurm_executor.h"
+#include "server/decomposition/work_folder.h"
+#include "server/live_output/live_output.h"
+#include "server/metrics/metrics_server.h"
+#include "server/mode_database/database.h"
+#include "server/mode_database/maintenance/database_admin.h"
+#include "server/mode_database/mode_database.h"
+#include "server/scene/scene_registry.h"
+
+namespace carillon {
+namespace {
+
+constexpr char kVersion[] = CARILLON_VERSION;
+
+/// Reads the command line and the configuration file once more.
+using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
+
+void LogWarning(const std::string& line) { spdlog::warn("{}", line); }
+
+void AnnounceReady(const ApiServer& server) {
+  for (const std::string& address : server.addresses()) {
+    std::cout << "listening on " << address << std::endl;
+  }
+  const int told = sd_notify(0, "READY=1");
+  if (told >= 0) return;
+  LogWarning(absl::StrCat("nobody takes the word that the daemon is ready at NOTIFY_SOCKET: ",
+                          std::system_category().message(-told)));
+}
+
+void LogError(const std::string& line) { spdlog::error("{}", line); }
+
+void LogInfo(const std::string& line) { spdlog::info("{}", line); }
+
+void CollectUnusedMeshes(ModeDatabase& database) {
+  const auto collected = database.meshes().Collect();
+  if (!collected.ok()) return LogWarning(std::string(collected.status().message()));
+  if (collected->mesh_count == 0) return;
+  spdlog::info("{} meshes that no model or job refers to were deleted", collected->mesh_count);
+}
+
+void LogMissingChanges(const Database& database) {
+  if (const std::string missing = database.MissingChanges(); !missing.empty()) {
+    spdlog::error("{}", missing);
+  }
+}
+
+/// Sets the budget of models, logs the stored changes that are missing, and removes unused meshes.
+void Tidy(ModeDatabase& database, const Options& options) {
+  database.models().KeepWithin({.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U,
+                                .log = LogWarning,
+                                .log_event = LogEvent});
+  LogMissingChanges(database.database());
+  CollectUnusedMeshes(database);
+}
+
+void LogOutput(const LiveOutput& output) {
+  const OutputState state = output.state();
+  spdlog::info("plays on {} at {} Hz with an output latency of {:.1f} ms", state.device,
+               output.format().sample_rate_hz, state.latency_s * 1000);
+}
+
+absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
+                                                       const DataDirectory& directory,
+                                                       const Clock& clock, RemoteRuns& runs) {
+  if (options.executor == "local") return MakeLocalExecutor(LocalExecutorOptionsOf(options), clock);
+  SlurmExecutorOptions slurm;
+  slurm.program = options.precompute_program;
+  slurm.directory = options.slurm_directory;
+  if (slurm.directory.empty()) slurm.directory = directory.database_file().parent_path() / "slurm";
+  slurm.partition = options.slurm_partition;
+  slurm.upload = {.address = options.slurm_upload,
+                  .client = options.slurm_client,
+                  .tls_roots_file = options.slurm_tls_roots};
+  if (options.worker_count > 0) slurm.job_count = options.worker_count;
+  if (options.job_memory_mib > 0) {
+    slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
+  }
+  slurm.time_limit = std::chrono::seconds(static_cast<int64_t>(options.job_time_s));
+  return MakeSlurmExecutor(slurm, runs);
+}
+
+absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
+                                                              const DataDirectory& directory,
+                                                              ModeDatabase& database,
+                                                              const Clock& clock,
+                                                              RemoteRuns& runs) {
+  ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor,
+                   MakeExecutor(options, directory, clock, runs));
+  return DecompositionQueue::Make(
+      database, std::move(executor), clock,
+      {.max_queued_count = static_cast<size_t>(options.queue_limit),
+       .max_queued_count_of_client =
+           ClientLimits::ShareOf(static_cast<size_t>(options.queue_limit), options.client_share),
+       .transfers = options.transfers,
+       .log = LogWarning,
+       .log_event = LogEvent});
+}
+
+/// The present settings with those of `read` that can change while the daemon runs.
+Options WithReloadable(Options present, const Options& read) {
+  for (std::string Options::*const file :
+       {&Options::tls_certificate_file, &Options::tls_key_file, &Options::tls_client_roots_file,
+        &Options::access_file}) {
+    if ((present.*file).empty() == (read.*file).empty()) present.*file = read.*file;
+  }
+  present.log_level = read.log_level;
+  return present;
+}
+
+/// Applies the settings that can change while the daemon runs; says which cannot.
+void Reload(const ReadOptions& read_options, Options& options, ApiServer& server) {
+  sd_notify(0, "RELOADING=1");
+  const absl::StatusOr<CommandLine> read = read_options();
+  absl::Status status = read.status();
+  Options changed = options;
+  if (status.ok()) {
+    changed = WithReloadable(options, read->options);
+    status = server.Reload(ApiSettingsOf(changed));
+  }
+  if (status.ok()) {
+    // The outcome is logged if the old level or the new one lets it through.
+    LowerLogLevel(changed.log_level);
+    if (const auto names = DifferentSettings(changed, read->options); !names.empty()) {
+      spdlog::warn(
+          "these changed settings need a restart: {}; a reload takes only the log level, the "
+          "access file and the TLS files into account, and does not begin or end the use of a file",
+          absl::StrJoin(names, ", "));
+    }
+    options = changed;
+    spdlog::info(
+        "the configuration, the access file and the TLS files were read again; the log level is {}",
+        options.log_level);
+    SetLogLevel(options.log_level);
+  } else {
+    spdlog::error("nothing was changed by the reload: {}", std::string(status.message()));
+  }
+  sd_notify(0, "READY=1");
+}
+
+/// Checks that decompositions can run, as far as this machine decides it.
+absl::Status CheckDecomposition(const Options& options) {
+  if (options.executor != "local") return absl::OkStatus();
+  RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
+  return CheckWorkFolder(DataDirectory::WorkDirectory(options.data_directory));
+}
+
+/// Null if no metrics are wanted.
+absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& options,
+                                                            const MeasuredRooms& rooms) {
+  if (options.metrics_address.empty()) return nullptr;
+  return MetricsServer::Start(options.metrics_address, [rooms] { return ReadMetrics(rooms); });
+}
+
+/// Serves until a stop signal arrives, and lets the sound fade out.
+absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
+                   const StopGuard& guard) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
+  LogOutput(rooms.output);
+  guard.CompleteStart();
+  AnnounceReady(rooms.server);
+  std::optional<Watchdog> watchdog;
+  if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, ReturnFreeMemory, LogInfo);
+  ExpectEnd();
+  guard.BeginStop();
+  sd_notify(0, "STOPPING=1");
+  rooms.output.FadeOut();
+  return absl::OkStatus();
+}
+
+/// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
+/// destroyed before them.
+absl::Status Run(Options options, const ReadOptions& read_options, const StopGuard& guard) {
+  RETURN_IF_ERROR(CheckLimits());
+  SystemClock clock;
+  ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
+  ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
+                   ModeDatabase::Open(directory.database_file(), clock));
+  Tidy(*database, options);
+  RemoteRuns runs;
+  ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
+                   MakeQueue(options, directory, *database, clock, runs));
+  ASSIGN_OR_RETURN(const std::unique_ptr<LiveOutput> output,
+                   LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning));
+  SceneRegistry scenes(output->mixer(), &database->transfers());
+  database->transfers().Listen(
+      [&scenes](const std::string& model_digest) { scenes.TakeOverTransfers(model_digest); });
+  const absl::Cleanup listen_no_more = [&database] { database->transfers().Listen(nullptr); };
+  ASSIGN_OR_RETURN(const std::unique_ptr<ApiServer> server,
+                   ApiServer::Start(ApiSettingsOf(options), {.database = *database,
+                                                             .decompositions = *decompositions,
+                                                             .runs = runs,
+                                                             .scenes = scenes,
+                                                             .output = *output,
+                                                             .clock = clock,
+                                                             .log = LogWarning,
+                                                             .log_error = LogError,
+                                                             .log_event = LogEvent,
+                                                             .check_decomposition = [options] {
+                                                               return CheckDecomposition(options);
+                                                             }}));
+  return Serve({.version = kVersion,
+                .output = *output,
+                .scenes = scenes,
+                .decompositions = *decompositions,
+                .database = *database,
+                .server = *server},
+               options, read_options, guard);
+}
+
+/// Prints what a database has.
+absl::Status PrintContents(const std::filesystem::path& file) {
+  ASSIGN_OR_RETURN(const auto database, Database::Open(file));
+  ASSIGN_OR_RETURN(const DatabaseStats stats, ReadStats(*database));
+  std::cout << "models: " << stats.model_count << ", meshes: " << stats.mesh_count
+            << ", jobs: " << stats.job_count << std::endl;
+  return absl::OkStatus();
+}
+
+/// Says how many faults a check or a repair has found.
+absl::Status Conclude(int finding_count, absl::string_view outcome) {
+  std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
+  if (finding_count == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT", outcome);
+}
+
+absl::Status Check(const std::filesystem::path& file, const OnFinding& on_finding) {
+  RETURN_IF_ERROR(CheckDatabase(file, on_finding));
+  return PrintContents(file);
+}
+
+/// Prints what the database has now, and where the old one is.
+absl::Status Report(const std::filesystem::path& file, const std::filesystem::path& kept) {
+  std::error_code ignored;
+  if (std::filesystem::exists(kept, ignored)) {
+    std::cout << "the old database is kept as " << kept.string() << std::endl;
+  } else if (!kept.empty()) {
+    std::cout << "what was left of the old database is kept as " << kept.string()
+              << "-wal or -count" << std::endl;
+  }
+  return PrintContents(file);
+}
+
+/// Logs an error, and returns the exit status that belongs to it.
+int Fail(const absl::Status& status, int exit_status) {
+  spdlog::error("{}", EscapedText(std::string(status.message())));
+  return exit_status;
+}
+
+/// Runs the daemon until it is stopped. Returns the exit status.
+int RunDaemon(const CommandLine& command, const ReadOptions& read_options) {
+  BlockSignals();
+  ApiServer::KeepLibrary();
+  const StopGuard guard(LogInfo);
+  if (const absl::Status wrong = CheckRooms(command); !wrong.ok()) return Fail(wrong, kWrongUsage);
+  const absl::Status status = Run(command.options, read_options, guard);
+  return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
+}
+
+/// Checks the settings without running the daemon. Returns the exit status.
+int CheckOnly(const CommandLine& command) {
+  if (const absl::Status wrong = CheckRooms(command); !wrong.ok()) return Fail(wrong, kWrongUsage);
+  std::cout << "the configuration is valid" << std::endl;
+  return EXIT_SUCCESS;
+}
+
+/// Runs `carillond db check|repair|restore`.
+absl::Status RunDatabaseCommand(const CommandLine& command) {
+  signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
+  const std::filesystem::path folder = command.options.data_directory;
+  const bool restores = command.database_command == "restore";
+  std::error_code ignored;
+  const std::filesystem::file_status database =
+      std::filesystem::symlink_status(folder / DataDirectory::kDatabaseName, ignored);
+  if (!restores && !std::filesystem::exists(database)) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat("there is no database ", DataDirectory::kDatabaseName, " in ",
+                                folder.string(), ": name its folder with --data-dir"));
+  }
+  ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(folder));
+  int finding_count = 0;
+  const auto on_finding = [&](const std::string& line) {
+    ++finding_count;
+    std::cout << line << std::endl;
+  };
+  const std::filesystem::path file = directory.database_file();
+  if (command.database_command == "check") {
+    RETURN_IF_ERROR(Check(file, on_finding));
+    return Conclude(finding_count,
+                    "the faults above were found: `carillond db repair` keeps all undamaged rows");
+  }
+  ASSIGN_OR_RETURN(
+      const std::filesystem::path kept,
+      restores ? RestoreDatabase(file, command.backup_file) : RepairDatabase(file, on_finding));
+  RETURN_IF_ERROR(Report(file, kept));
+  if (restores) return absl::OkStatus();
+  return Conclude(finding_count, "what the lines above name is lost; all else was kept");
+}
+
+int Main(int argc, char* const* argv) {
+  ReportUncaughtExceptions();
+  SetUpLog();
+  const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
+  const absl::StatusOr<CommandLine> command = read_options();
+  if (!command.ok()) return Fail(command.status(), kWrongUsage);
+  if (!command->run) return command->exit_status;
+  if (command->only_print) {
+    std::cout << PrintConfiguration(command->options);
+    return EXIT_SUCCESS;
+  }
+  SetLogLevel(command->options.log_level);
+  if (command->only_check) return CheckOnly(*command);
+  if (command->database_command.empty()) {
+    BoundFreeMemory(argv);
+    return RunDaemon(*command, read_options);
+  }
+  const absl::Status status = RunDatabaseCommand(*command);
+  return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
+}
+
+}  // namespace
+}  // namespace carillon
+
+int main(int argc, char** argv) { return carillon::Main(argc, argv); }

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/daemon/watchdog.h"
+
+#include <systemd/sd-daemon.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace carillon {
+namespace {
+
+using std::chrono::microseconds;
+
+constexpr microseconds kStatusPeriod = std::chrono::seconds(5);
+
+/// A third of systemd's limit, so that one delay does not end the daemon.
+microseconds Period() {
+  uint64_t limit_us = 0;
+  if (sd_watchdog_enabled(0, &limit_us) <= 0) return kStatusPeriod;
+  return std::min(kStatusPeriod, microseconds(limit_us / 3));
+}
+
+std::string StatusOf(const OutputState& state) {
+  const std::string trouble =
+      state.device_message.empty() ? "" : absl::StrCat("; ", state.device_message);
+  return absl::StrCat("STATUS=plays on ", state.device, " at a load of ",
+                      static_cast<int>(100 * state.load), " %", trouble);
+}
+
+}  // namespace
+
+Watchdog::Watchdog(LiveOutput& output) : output_(output), thread_([this] { Run(); }) {}
+
+Watchdog::~Watchdog() {
+  stop_.release();
+  thread_.join();
+}
+
+void Watchdog::Run() {
+  const microseconds period = Period();
+  uint64_t last_frame = output_.mixer().frame();
+  while (!stop_.try_acquire_for(period)) {
+    const uint64_t frame = output_.mixer().frame();
+    const std::string status = StatusOf(output_.state());
+    sd_notify(0, (frame != last_frame ? absl::StrCat("WATCHDOG=1\n", status) : status).c_str());
+    last_frame = frame;
+  }
+}
+
+}  // namespace carillon

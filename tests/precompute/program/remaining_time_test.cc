@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/program/remaining_time.h"
+
+#include <gtest/gtest.h>
+
+namespace carillon::precompute {
+namespace {
+
+// As a body of some size: 10 s counting, 5 s factoring, 80 s solving, 5 s checking, 20 s coupling.
+const std::vector<PlannedStep> kSteps = {{v1::PHASE_VERIFY, 10},
+                                         {v1::PHASE_FACTOR, 5},
+                                         {v1::PHASE_SOLVE, 80},
+                                         {v1::PHASE_VERIFY, 5},
+                                         {v1::PHASE_WRITE, 20}};
+
+/// Goes through all steps on a machine that takes `slowness` seconds for a predicted one; calls
+/// `look` with the time and the true remaining time at the end of each, before the next begins.
+template <typename Look>
+void RunAll(RemainingTime& remaining, double begun_s, double slowness, Look look) {
+  double now_s = begun_s;
+  double left_s = 120 * slowness;
+  remaining.Plan(now_s, kSteps);
+  for (const PlannedStep& step : kSteps) {
+    remaining.Progress(now_s, step.phase, 0);
+    now_s += slowness * step.predicted_s;
+    left_s -= slowness * step.predicted_s;
+    remaining.Progress(now_s, step.phase, 1);
+    look(now_s, left_s);
+  }
+}
+
+TEST(RemainingTime, IsNotKnownBeforeThereIsAPlan) {
+  RemainingTime remaining;
+  EXPECT_FALSE(remaining.Seconds(0).has_value());
+  remaining.BeginRound(1, {});
+  remaining.Progress(2, v1::PHASE_MESH, 0);
+  EXPECT_FALSE(remaining.Seconds(3).has_value());
+}
+
+TEST(RemainingTime, IsThePlanWhereNothingHasBeenMeasured) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(7, kSteps);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(7).value(), 120);
+}
+
+TEST(RemainingTime, IsTrueAtEachPhasesEndWhateverTheMachinesSpeed) {
+  for (const double slowness : {0.2, 1.0, 7.0}) {
+    RemainingTime remaining;
+    remaining.BeginRound(0, {});
+    RunAll(remaining, 3, slowness, [&](double now_s, double left_s) {
+      // 0.05 s of the 10 s of the first step are taken on trust.
+      EXPECT_NEAR(remaining.Seconds(now_s).value(), left_s, 0.03 * left_s + 1e-9);
+    });
+  }
+}
+
+TEST(RemainingTime, FallsFromPhaseToPhase) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  double before = 1e9;
+  RunAll(remaining, 0, 2.5, [&](double now_s, double) {
+    EXPECT_LT(remaining.Seconds(now_s).value(), before);
+    before = remaining.Seconds(now_s).value();
+  });
+  EXPECT_DOUBLE_EQ(before, 0);
+}
+
+TEST(RemainingTime, FallsBySecondsWithinAPhaseThatReportsNothing) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(4).value(), 116);
+  // It takes longer than foreseen: never over before its end.
+  EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.5);
+}
+
+TEST(RemainingTime, WhatIsReportedWithinAPhaseCorrectsItAtOnce) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(15, v1::PHASE_VERIFY, 0.5);
+  // Three times as slow as predicted: 345 s are left.
+  EXPECT_NEAR(remaining.Seconds(15).value(), 345, 0.02 * 345);
+}
+
+TEST(RemainingTime, FallsBySecondsAfterTheLastReportOfAPhase) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(5, v1::PHASE_VERIFY, 0.5);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(5).value(), 115);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(8).value(), 112);
+  // Silence is no news of the machine's speed.
+  EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.25);
+}
+
+TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(20, v1::PHASE_VERIFY, 1);
+  std::vector<PlannedStep> more = kSteps;
+  more[2].predicted_s = 400;
+  remaining.Plan(20, more);
+  remaining.Progress(20, v1::PHASE_FACTOR, 0);
+  EXPECT_NEAR(remaining.Seconds(20).value(), 2 * (5 + 400 + 5 + 20), 5);
+}
+
+TEST(RemainingTime, CountsTheRoundsThatAreToFollow) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {.later_rounds = 3});
+  RunAll(remaining, 0, 1, [&](double now_s, double left_s) {
+    EXPECT_NEAR(remaining.Seconds(now_s).value(), left_s + 3 * 120, 1e-6);
+  });
+  remaining.BeginRound(120, {.expected_s = 300});
+  EXPECT_DOUBLE_EQ(remaining.Seconds(120).value(), 300);
+  remaining.Progress(130, v1::PHASE_MESH, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(140).value(), 280);
+}
+
+TEST(RemainingTime, TheRoundBeforeTellsMoreThanThePlanUntilTheModesAreCounted) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {.expected_s = 300});
+  remaining.Plan(10, kSteps);
+  remaining.Progress(10, v1::PHASE_VERIFY, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(10).value(), 290);
+  remaining.Progress(20, v1::PHASE_FACTOR, 0);
+  EXPECT_DOUBLE_EQ(remaining.Seconds(20).value(), 110);
+}
+
+TEST(RemainingTime, StepsOfASecondAttemptCountAgain) {
+  RemainingTime remaining;
+  remaining.BeginRound(0, {});
+  remaining.Plan(0, kSteps);
+  remaining.Progress(0, v1::PHASE_VERIFY, 0);
+  remaining.Progress(10, v1::PHASE_FACTOR, 0);
+  remaining.Progress(15, v1::PHASE_SOLVE, 0);
+  remaining.Progress(95, v1::PHASE_VERIFY, 0);
+  remaining.Progress(105, v1::PHASE_FACTOR, 0);
+  EXPECT_NEAR(remaining.Seconds(105).value(), 110, 8);
+}
+
+}  // namespace
+}  // namespace carillon::precompute

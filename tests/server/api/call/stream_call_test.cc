@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/call/stream_call.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/wrappers.pb.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <new>
+#include <string>
+#include <vector>
+
+namespace carillon {
+namespace {
+
+using ::testing::ElementsAre;
+
+using Number = google::protobuf::Int32Value;
+
+/// Stands for gRPC's reactor, and records what it is asked to do.
+class RecordingReactor {
+ public:
+  virtual ~RecordingReactor() = default;
+  virtual void OnDone() = 0;
+  virtual void OnReadDone(bool) {}
+  virtual void OnWriteDone(bool) {}
+  virtual void OnCancel() {}
+
+  void StartRead(grpc::ByteBuffer* bytes) {
+    ++read_count;
+    reading = bytes;
+  }
+  void StartWrite(const std::string* response) { written.push_back(*response); }
+  void Finish(const grpc::Status& status) { ends.push_back(status.error_code()); }
+
+  void Receive(const std::string& message) {
+    const grpc::Slice slice(message);
+    *reading = grpc::ByteBuffer(&slice, 1);
+    OnReadDone(true);
+  }
+
+  int read_count = 0;
+  grpc::ByteBuffer* reading = nullptr;
+  std::vector<std::string> written;
+  std::vector<grpc::StatusCode> ends;
+};
+
+using Writer = StreamWriter<StreamCall<RecordingReactor>, std::string>;
+
+/// Sends the messages given to it.
+class MessageCall final : public Writer {
+ public:
+  MessageCall() : Writer(nullptr) {}
+  using Writer::StartWriting;
+  using Writer::Wake;
+
+  void Send(const std::string& message) {
+    waiting.push_back(message);
+    Wake();
+  }
+
+  std::vector<std::string> waiting;
+  bool last = false;
+  absl::Status error;
+  std::function<void()> while_filling = [] {};
+
+ private:
+  absl::StatusOr<Supply> Fill(std::string& response) override {
+    const bool empty = waiting.empty();
+    while_filling();
+    if (!error.ok()) return error;
+    if (empty) return last ? Supply::kEnd : Supply::kLater;
+    response = waiting.front();
+    waiting.erase(waiting.begin());
+    return Supply::kMessage;
+  }
+};
+
+TEST(StreamWriter, WritesOneMessageAtATimeInOrder) {
+  MessageCall call;
+  call.StartWriting();
+  call.Send("a");
+  call.Send("b");
+  call.Send("c");
+  EXPECT_THAT(call.written, ElementsAre("a"));
+  call.OnWriteDone(true);
+  call.OnWriteDone(true);
+  EXPECT_THAT(call.written, ElementsAre("a", "b", "c"));
+  call.last = true;
+  call.OnWriteDone(true);
+  EXPECT_THAT(call.ends, ElementsAre(grpc::OK));
+}
+
+TEST(StreamWriter, WritesWhatComesWhileItFindsNothing) {
+  MessageCall call;
+  call.while_filling = [&call, first = true]() mutable {
+    if (std::exchange(first, false)) call.Send("late");
+  };
+  call.StartWriting();
+  EXPECT_THAT(call.written, ElementsAre("late"));
+}
+
+TEST(StreamWriter, WritesNothingBeforeItIsStarted) {
+  MessageCall call;
+  call.Send("early");
+  EXPECT_TRUE(call.written.empty());
+  call.StartWriting();
+  EXPECT_THAT(call.written, ElementsAre("early"));
+}
+
+TEST(StreamWriter, EndsWithTheErrorOfFill) {
+  MessageCall call;
+  call.error = absl::NotFoundError("gone");
+  call.StartWriting();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::NOT_FOUND));
+  call.Wake();
+  call.OnCancel();
+  EXPECT_EQ(call.ends.size(), 1U);
+}
+
+TEST(StreamWriter, EndsAtOnceWhereItIsCancelledWhileItWaits) {
+  MessageCall call;
+  call.StartWriting();
+  call.OnCancel();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+  call.Send("too late");
+  EXPECT_TRUE(call.written.empty());
+  EXPECT_EQ(call.ends.size(), 1U);
+}
+
+TEST(StreamWriter, EndsAfterTheWriteDuringWhichItIsCancelled) {
+  for (const bool written : {false, true}) {
+    MessageCall call;
+    call.StartWriting();
+    call.Send("a");
+    call.OnCancel();
+    EXPECT_TRUE(call.ends.empty());
+    call.OnWriteDone(written);
+    EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+  }
+}
+
+TEST(StreamWriter, EndsWhereItIsCancelledWhileItFindsNothing) {
+  MessageCall call;
+  call.while_filling = [&call] { call.OnCancel(); };
+  call.StartWriting();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+}
+
+/// Takes numbers up to 2.
+class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Number> {
+ public:
+  NumberCall() : StreamReader(nullptr) { StartReading(); }
+  std::vector<int> taken;
+  bool all_read = false;
+  bool throws = false;
+  bool is_gone = false;
+
+  /// Receives the number of requests that were read.
+  void ReceiveNext() {
+    Number number;
+    number.set_value(read_count);
+    Receive(number.SerializeAsString());
+  }
+
+ private:
+  bool gone() const override { return is_gone; }
+  absl::Status Take(const Number& request) override {
+    if (request.value() > 2) return absl::OutOfRangeError("too large");
+    if (request.value() == 2 && throws) throw std::bad_alloc();
+    taken.push_back(request.value());
+    return absl::OkStatus();
+  }
+  void AllRead() override { all_read = true; }
+};
+
+TEST(StreamReader, TakesOneRequestAfterTheOther) {
+  NumberCall call;
+  call.ReceiveNext();
+  call.ReceiveNext();
+  call.OnReadDone(false);
+  EXPECT_THAT(call.taken, ElementsAre(1, 2));
+  EXPECT_TRUE(call.all_read);
+}
+
+TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
+  NumberCall call;
+  for (int i = 0; i < 3; ++i) call.ReceiveNext();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::OUT_OF_RANGE));
+  EXPECT_EQ(call.read_count, 3);
+  EXPECT_FALSE(call.all_read);
+}
+
+TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) {
+  for (const int read_before : {0, 2}) {
+    NumberCall call;
+    for (int i = 0; i < read_before; ++i) call.ReceiveNext();
+    call.Receive("\xff");
+    EXPECT_THAT(call.ends, ElementsAre(grpc::INVALID_ARGUMENT));
+    EXPECT_EQ(call.read_count, 1 + read_before);
+    EXPECT_FALSE(call.all_read);
+  }
+}
+
+TEST(StreamReader, TakesNothingMoreFromAClientThatHasGone) {
+  NumberCall call;
+  call.ReceiveNext();
+  call.is_gone = true;
+  call.ReceiveNext();
+  EXPECT_THAT(call.taken, ElementsAre(1));
+  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+}
+
+TEST(StreamReader, EndsWithAnErrorWhereMemoryIsMissing) {
+  NumberCall call;
+  call.throws = true;
+  call.ReceiveNext();
+  call.ReceiveNext();
+  EXPECT_THAT(call.ends, ElementsAre(grpc::RESOURCE_EXHAUSTED));
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/convert/column_conversion.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "server/api/convert/contact_conversion.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+/// The rows of a step, and what an intake of a scene without objects rejects of it.
+struct Told {
+  std::vector<ObjectImpulse> impulses;
+  std::vector<Pose> poses;
+  uint64_t rejected_count = 0;
+  std::string rejection;
+};
+
+class NoTarget final : public EventTarget {
+ public:
+  uint64_t frame() const override { return 0; }
+  void Push(const MixerEvent&) override {}
+};
+
+Told Read(const v1::ContactStep& step) {
+  Told told;
+  for (int row = 0; row < step.columns().object_size() && Validate(step.columns()).ok(); ++row) {
+    ReadRow(step.columns(), row, told.impulses.emplace_back());
+  }
+  const v1::PoseColumns& poses = step.pose_columns();
+  for (int row = 0; row < poses.object_size() && Validate(poses).ok(); ++row) {
+    told.poses.push_back(ReadRow(poses, row));
+  }
+  Scene scene("an empty scene");
+  NoTarget target;
+  ContactIntake intake(scene, target, {.step_s = 0.01});
+  EXPECT_TRUE(ReadStep(step, intake).ok());
+  told.rejected_count = intake.rejected_count();
+  told.rejection = intake.last_rejection().ToString();
+  return told;
+}
+
+template <typename Column>
+void Append(Column* column, std::initializer_list<float> numbers) {
+  for (const float number : numbers) column->Add(number);
+}
+
+/// Three impulses of which two have a second object.
+v1::ContactStep ThreeImpulses() {
+  v1::ContactStep step;
+  v1::ImpulseColumns& columns = *step.mutable_columns();
+  for (const uint32_t second : {7U, 0U, 8U}) {
+    columns.add_object(1);
+    Append(columns.mutable_point_m(), {1, 2, 3});
+    Append(columns.mutable_impulse_newton_seconds(), {4, 5, 6});
+    columns.add_duration_s(0.001F);
+    columns.add_time_offset_s(0.002F);
+    columns.add_second_object(second);
+    Append(columns.mutable_second_point_m(), {7, 8, 9});
+  }
+  Append(columns.mutable_second_rotation(), {0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  return step;
+}
+
+v1::ContactStep TwoPoses() {
+  v1::ContactStep step;
+  v1::PoseColumns& columns = *step.mutable_pose_columns();
+  columns.add_object(1);
+  columns.add_object(2);
+  for (const double x : {1.0, 2.0, 3.0, 4.0, 5.0, 6.0}) columns.add_position_m(x);
+  Append(columns.mutable_orientation(), {0, 1, 0, 0, 0, 0, 0, 0});
+  return step;
+}
+
+TEST(Columns, AContactHasASecondObjectWhereItsHandleIsNotZero) {
+  const Told told = Read(ThreeImpulses());
+  ASSERT_EQ(told.impulses.size(), 3U);
+  ASSERT_TRUE(told.impulses[0].contact.second.has_value());
+  EXPECT_EQ(told.impulses[0].contact.second->handle, 7U);
+  EXPECT_EQ(std::get<Point>(told.impulses[0].contact.second->location), (Point{7, 8, 9}));
+  ASSERT_TRUE(told.impulses[0].contact.second->rotation.has_value());
+  EXPECT_EQ(told.impulses[0].contact.second->rotation->y, 1);
+  EXPECT_FALSE(told.impulses[1].contact.second.has_value());
+  EXPECT_EQ(told.impulses[2].contact.second->handle, 8U);
+  EXPECT_FALSE(
+      told.impulses[2].contact.second->rotation.has_value());  // four zeros: as the poses say
+}
+
+TEST(Columns, WhatMayBeEmptyIsNone) {
+  v1::ContactStep step = ThreeImpulses();
+  v1::ImpulseColumns& columns = *step.mutable_columns();
+  columns.clear_second_rotation();
+  EXPECT_FALSE(Read(step).impulses[0].contact.second->rotation.has_value());
+  columns.clear_second_object();
+  columns.clear_second_point_m();
+  columns.clear_duration_s();
+  columns.clear_time_offset_s();
+  const Told told = Read(step);
+  ASSERT_EQ(told.impulses.size(), 3U);
+  EXPECT_FALSE(told.impulses[0].contact.second.has_value());
+  EXPECT_FALSE(told.impulses[0].contact.impulse.duration_s.has_value());
+}
+
+TEST(Columns, PosesAreTurnedWhereTheColumnSaysSo) {
+  v1::ContactStep step = TwoPoses();
+  const Told told = Read(step);
+  ASSERT_EQ(told.poses.size(), 2U);
+  EXPECT_EQ(told.poses[1].position_m, (Vector3{4, 5, 6}));
+  EXPECT_EQ(told.poses[0].orientation.x, 1);
+  EXPECT_EQ(told.poses[1].orientation.w, 1);
+  step.mutable_pose_columns()->clear_orientation();
+  EXPECT_EQ(Read(step).poses[0].orientation.w, 1);
+}
+
+TEST(Columns, AColumnOfAnotherLengthRejectsAllImpulsesAndIsNamed) {
+  const auto expect = [](absl::string_view name, uint64_t rejected_count,
+                         const std::function<void(v1::ImpulseColumns&)>& spoil) {
+    v1::ContactStep step = ThreeImpulses();
+    spoil(*step.mutable_columns());
+    const Told told = Read(step);
+    EXPECT_TRUE(told.impulses.empty());
+    EXPECT_EQ(told.rejected_count, rejected_count) << name;
+    EXPECT_THAT(told.rejection, HasSubstr("COLUMNS_MISMATCHED: "));
+    EXPECT_THAT(told.rejection, HasSubstr(absl::StrCat("column ", name, " has")));
+  };
+  // Three contacts, two of them of two objects: both count.
+  expect("point_m", 5, [](auto& columns) { columns.add_point_m(0); });
+  expect("impulse_newton_seconds", 5, [](auto& it) { it.clear_impulse_newton_seconds(); });
+  expect("duration_s", 5, [](auto& columns) { columns.add_duration_s(0); });
+  expect("time_offset_s", 5, [](auto& columns) { columns.add_time_offset_s(0); });
+  expect("second_object", 6, [](auto& columns) { columns.add_second_object(9); });
+  expect("second_point_m", 5, [](auto& columns) { columns.clear_second_point_m(); });
+  expect("second_rotation", 5, [](auto& columns) { columns.add_second_rotation(1); });
+  expect("second_point_m", 3, [](auto& columns) { columns.clear_second_object(); });
+}
+
+TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
+  v1::ContactStep step = TwoPoses();
+  step.mutable_pose_columns()->add_orientation(0);
+  const Told turned = Read(step);
+  EXPECT_EQ(turned.rejected_count, 2U);
+  EXPECT_THAT(turned.rejection, HasSubstr("COLUMNS_MISMATCHED: the column orientation has 9"));
+  step.mutable_pose_columns()->add_position_m(0);
+  EXPECT_THAT(Read(step).rejection, HasSubstr("the column position_m has 7"));
+  step.mutable_pose_columns()->clear_object();
+  EXPECT_EQ(Read(step).rejected_count, 1U);
+}
+
+TEST(Columns, ARejectionNamesItsRowUnlessThereIsOneOnly) {
+  v1::ContactStep step = ThreeImpulses();
+  EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: columns[2]: an empty scene has "
+                                              "no object 1, which is unknown"));
+  *step.mutable_contact_columns()->mutable_impulses() = step.columns();
+  step.clear_columns();
+  EXPECT_THAT(Read(step).rejection, HasSubstr("contact_columns[2]: an empty scene"));
+  EXPECT_THAT(Read(TwoPoses()).rejection, HasSubstr("pose_columns[1]: "));
+  v1::ContactStep rows;
+  rows.add_impulses()->set_object(1);
+  EXPECT_THAT(Read(rows).rejection, HasSubstr("LOCATION_MISSING: a contact"));
+  rows.add_impulses()->set_object(2);
+  EXPECT_THAT(Read(rows).rejection,
+              HasSubstr("LOCATION_MISSING: impulses[1]: a contact on object 2"));
+}
+
+TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
+  v1::EngineContactColumns columns;
+  *columns.mutable_impulses() = ThreeImpulses().columns();
+  columns.set_depth(0.4);
+  for (const uint32_t partner : {4U, 5U, 6U}) {
+    columns.add_partner(partner);
+    columns.add_travel_speed_m_per_s(static_cast<float>(partner) / 2);
+  }
+  ASSERT_TRUE(Validate(columns).ok());
+  ObjectTouch touch;
+  ReadRow(columns, 2, touch);
+  EXPECT_EQ(touch.contact.second->handle, 8U);
+  EXPECT_FLOAT_EQ(static_cast<float>(touch.time_offset_s), 0.002F);
+  EXPECT_EQ(touch.partner, 6U);
+  EXPECT_EQ(touch.roughness.travel_speed_m_per_s, 3);
+  EXPECT_EQ(touch.roughness.depth, 0.4);
+  EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
+  columns.mutable_partner()->RemoveLast();
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: the column partner"));
+  v1::ContactStep step;
+  *step.mutable_contact_columns() = columns;
+  EXPECT_EQ(Read(step).rejected_count, 5U);  // three objects and two second ones
+}
+
+TEST(ColumnConversion, ADurationBelowZeroIsAbsentAndAStrikerHoldsForAll) {
+  v1::ContactStep step = ThreeImpulses();
+  step.mutable_columns()->set_duration_s(1, -1);
+  step.mutable_columns()->set_duration_s(2, 0);
+  const Told told = Read(step);
+  EXPECT_FLOAT_EQ(static_cast<float>(told.impulses[0].contact.impulse.duration_s.value()), 0.001F);
+  EXPECT_EQ(told.impulses[1].contact.impulse.duration_s, std::nullopt);
+  EXPECT_EQ(told.impulses[2].contact.impulse.duration_s, 0);
+  step.mutable_columns()->clear_duration_s();
+  EXPECT_EQ(Read(step).impulses[2].contact.impulse.duration_s, std::nullopt);
+  step.mutable_columns()->mutable_hertz()->set_striker("stel");
+  EXPECT_THAT(Read(step).rejection, HasSubstr("UNKNOWN_STRIKER"));
+  EXPECT_THAT(Read(step).rejection, HasSubstr("the nearest is steel"));
+}
+
+}  // namespace
+}  // namespace carillon

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/daemon/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/server/mode_database/sample_model.h"
+
+namespace carillon {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+absl::StatusOr<CommandLine> Read(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "carillond");
+  return ReadCommandLine(static_cast<int>(arguments.size()), arguments.data(), "0");
+}
+
+class OptionsFile : public testing::Test {
+ protected:
+  const char* Write(const std::string& text) {
+    WriteBytes(file_, text);
+    return file_.c_str();
+  }
+
+  void ExpectRefused(const std::string& text, const char* named) {
+    EXPECT_THAT(Read({"--config", Write(text)}).status().ToString(),
+                testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr(named)));
+  }
+
+ private:
+  TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "carillond.toml";
+};
+
+TEST_F(OptionsFile, FlagsWinOverTheFileAndTheFileOverTheDefaults) {
+  const char* file = Write(
+      "listen = [\"unix:/a\", \"127.0.0.1:1\"]\nsample_rate = 44100\nblock_frames = 64\nchannels = "
+      "2\n");
+  const absl::StatusOr<CommandLine> command = Read({"--config", file, "--block-frames", "256"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->run);
+  EXPECT_THAT(command->options.addresses, ElementsAre("unix:/a", "127.0.0.1:1"));
+  EXPECT_EQ(command->options.sample_rate_hz, 44100U);
+  EXPECT_EQ(command->options.block_frame_count, 256U);
+  EXPECT_EQ(command->options.channel_count, 2U);
+  EXPECT_EQ(command->options.audio_device, "auto");
+}
+
+TEST_F(OptionsFile, TheFileInTheConfigurationDirectoryIsReadIfNoOtherIsNamed) {
+  const std::filesystem::path file = Write("sample_rate = 44100\n");
+  setenv("CONFIGURATION_DIRECTORY", file.parent_path().c_str(), 1);
+  const absl::StatusOr<CommandLine> with_file = Read({});
+  setenv("CONFIGURATION_DIRECTORY", "/nonexistent", 1);
+  const absl::StatusOr<CommandLine> without_file = Read({});
+  unsetenv("CONFIGURATION_DIRECTORY");
+  ASSERT_TRUE(with_file.ok()) << with_file.status();
+  EXPECT_EQ(with_file->options.sample_rate_hz, 44100U);
+  ASSERT_TRUE(without_file.ok()) << without_file.status();
+  EXPECT_EQ(without_file->options.sample_rate_hz, 48000U);
+}
+
+TEST_F(OptionsFile, ListenMayBeGivenMoreThanOnceAndReplacesTheFiles) {
+  const char* file = Write("listen = \"unix:/a\"\n");
+  const absl::StatusOr<CommandLine> command =
+      Read({"--config", file, "--listen", "unix:/b", "--listen", "127.0.0.1:0"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_THAT(command->options.addresses, ElementsAre("unix:/b", "127.0.0.1:0"));
+}
+
+TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
+  const auto expect = [&](const char* text, const char* named) { ExpectRefused(text, named); };
+  expect("volume = 11\n", "volume");
+  expect("sample_rate = \"high\"\n", "sample_rate");
+  expect("\nsample_rate = 100\n", " line 2: sample_rate is 100; it must be 8000 to 192000");
+  expect("block_frames = 4096\n", " line 1: block_frames is 4096");
+  expect("memory_budget_mib = 1099511627777\n", "is 1099511627777; it must be 0 to 1099511627776");
+  expect("executor = \"cloud\"\n", " line 1: executor is \"cloud\"; it must be local or slurm");
+  expect("tls_key = \"key.pem\"\n", "--tls-certificate");
+  expect("a = \n", "line 1");
+  expect("workers = 1\nsample_rate = \"high\"\n", "line 2: sample_rate");
+  expect("workers = 1\ntransfers = 1\n", "line 2: transfers has a value of the wrong type");
+  expect("data_dir = \"\"\n", " line 1: data_dir names no folder");
+  expect("scene_grace = -1\n", " line 1: scene_grace is -1");
+  expect("client_share = 0\n", " line 1: client_share is 0; it must be 0.001 to 1");
+  expect("metrics = \"9464\"\n", " line 1: metrics is \"9464\"");
+  expect("log_level = \"loud\"\n",
+         " line 1: log_level is \"loud\"; it must be debug, info, warning or error");
+  expect("log_level = \"off\"\n", " line 1: log_level");
+  for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
+    expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), " line 1: slurm_upload");
+  }
+}
+
+TEST_F(OptionsFile, AValueOfAnotherTypeIsRefusedWithTheTypeThatIsWanted) {
+  ExpectRefused("workers = true\n",
+                " line 1: workers has a value of the wrong type or size; write a whole");
+  ExpectRefused("gain = false\n",
+                " line 1: gain has a value of the wrong type or size; write a number");
+  ExpectRefused("transfers = \"yes\"\n",
+                " line 1: transfers has a value of the wrong type or size; write true");
+  ExpectRefused("data_dir = true\n",
+                " line 1: data_dir has a value of the wrong type or size; write a text");
+  ExpectRefused("listen = [true]\n", " line 1: listen has a value of the wrong type");
+  ExpectRefused("workers = [1]\n", " line 1: workers has a value of the wrong type");
+  ExpectRefused("workers = 1.5\n", " line 1: workers has a value of the wrong type");
+  ExpectRefused("job_time = 2026-11-27\n", " line 1: job_time has a value of the wrong type");
+}
+
+TEST_F(OptionsFile, MetricsHaveOneAddress) {
+  for (const char* address : {"a:1,b:2", "127.0.0.1:1,2", "127.0.0.1: 1", "127.0.0.1 :1", "[::1]:1",
+                              "::1:1", ":1", "127.0.0.1:1s"}) {
+    ExpectRefused(std::string("metrics = \"") + address + "\"\n",
+                  "; it must be one HOST:PORT with an IPv4 address or a name");
+  }
+  ExpectRefused("gain = 1\nlisten = []\n",
+                " line 2: listen names nothing; write at least one address");
+  ExpectRefused("listen = \"127.0.0.1:1\"\nmetrics = \"127.0.0.1:1\"\n",
+                "--listen and --metrics both name 127.0.0.1:1");
+}
+
+TEST(Options, AFlagOutOfRangeIsNamedAsItIsWritten) {
+  EXPECT_THAT(Read({"--sample-rate", "1"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: --sample-rate is 1; it must be 8000 to 192000"));
+  EXPECT_THAT(Read({"--scene-grace", "nan"}).status().ToString(),
+              HasSubstr("--scene-grace is nan"));
+}
+
+TEST(Options, AWordIsNoNumberOnTheCommandLine) {
+  for (const char* flag : {"--workers", "--sample-rate", "--queue-limit", "--gain"}) {
+    testing::internal::CaptureStderr();
+    const absl::StatusOr<CommandLine> command = Read({flag, "true"});
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr(flag));
+    EXPECT_EQ(command->exit_status, 2) << flag;
+  }
+}
+
+TEST(Options, AFileThatIsNotThereIsRefused) {
+  EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: /nonexistent.toml: "));
+}
+
+TEST(Options, AFolderIsNoConfiguration) {
+  EXPECT_THAT(Read({"--config", "/"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: /: it is a folder"));
+}
+
+TEST_F(OptionsFile, ANamedPipeIsNoConfiguration) {
+  const char* const file = Write("");
+  std::filesystem::remove(file);
+  ASSERT_EQ(mkfifo(file, 0600), 0);
+  EXPECT_THAT(Read({"--config", file}).status().ToString(),
+              HasSubstr(std::string(file) + ": it is a named pipe; name a TOML file"));
+}
+
+TEST_F(OptionsFile, NamesTheSettingsThatDiffer) {
+  const Options first = Read({"--config", Write("gain = 0.5\nworkers = 1\n")})->options;
+  const Options second = Read({"--config", Write("gain = 0.25\nlisten = [\"unix:a\"]\n")})->options;
+  EXPECT_THAT(DifferentSettings(first, second), ElementsAre("listen", "gain", "workers"));
+  EXPECT_THAT(DifferentSettings(first, first), IsEmpty());
+}
+
+TEST_F(OptionsFile, TheLogLevelIsInfoUnlessAnotherIsNamed) {
+  EXPECT_EQ(Read({})->options.log_level, "info");
+  EXPECT_EQ(Read({"--config", Write("log_level = \"debug\"\n")})->options.log_level, "debug");
+  EXPECT_EQ(Read({"--log-level", "error"})->options.log_level, "error");
+}
+
+TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {
+  const absl::StatusOr<CommandLine> command =
+      Read({"--config", Write("workers = 1\n"), "--check-config"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->only_check);
+  EXPECT_FALSE(Read({"--config", Write("workers = -1\n"), "--check-config"}).ok());
+}
+
+TEST_F(OptionsFile, WhatIsPrintedReadsBackAsTheSameSettings) {
+  const absl::StatusOr<CommandLine> command =
+      Read({"--print-config", "--listen", "unix:/a \"b\"", "--listen", "127.0.0.1:1", "--workers",
+            "3", "--no-transfers", "--client-share", "0.25", "--metrics", "127.0.0.1:9464"});
+  ASSERT_TRUE(command.ok()) << command.status();
+  EXPECT_TRUE(command->only_print);
+  const std::string printed = PrintConfiguration(command->options);
+  EXPECT_THAT(printed, HasSubstr("\ntransfers = false\n"));
+  const absl::StatusOr<CommandLine> again = Read({"--config", Write(printed)});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->options, command->options);
+}
+
+TEST(Options, AFlagWithoutAValueDoesNotTakeTheNextFlagForIt) {
+  EXPECT_THAT(Read({"--data-dir=", "--check-config"}).status().ToString(),
+              testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr("--data-dir=")));
+  EXPECT_THAT(Read({"--data-dir", "", "--check-config"}).status().ToString(),
+              HasSubstr("INVALID_CONFIGURATION: "));
+}
+
+TEST(Options, VersionAndUnknownFlagsDoNotRun) {
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  const absl::StatusOr<CommandLine> version = Read({"--version"});
+  const absl::StatusOr<CommandLine> unknown = Read({"--loud"});
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "carillond 0\n");
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("--loud"));
+  EXPECT_FALSE(version->run);
+  EXPECT_EQ(version->exit_status, 0);
+  EXPECT_FALSE(unknown->run);
+  EXPECT_EQ(unknown->exit_status, 2);
+}
+
+}  // namespace
+}  // namespace carillon
