@@ -12,8 +12,6 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored lit
 namespace carillon::precompute {
 namespace {
 
-constexpr char kSolver[] = "carillon-precompute " CARILLON_VERSION;
-
 std::vector<std::array<float, 3>> ToFloat(const std::vector<Point>& points) {
   std::vector<std::array<float, 3>> result;
   result.reserve(points.size());

@@ -19,6 +19,9 @@
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
+
+const char kSolver[] = "carillon-precompute " CARILLON_VERSION;
+
 namespace {
 
 using google::protobuf::io::FileInputStream;

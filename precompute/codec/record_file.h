@@ -13,6 +13,9 @@
 
 namespace carillon::precompute {
 
+/// The program and its version, as stored files name it.
+extern const char kSolver[];
+
 using Bytes = std::span<const std::byte>;
 
 template <class T>

@@ -18,7 +18,6 @@ static_assert(std::endian::native == std::endian::little, "arrays are stored lit
 namespace carillon::precompute {
 namespace {
 
-constexpr char kSolver[] = "carillon-precompute " CARILLON_VERSION;
 /// Below it lumping and single precision spoil the small real part of the power at the surface.
 constexpr double kEfficient = 0.5;
 
