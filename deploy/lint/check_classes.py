@@ -1,0 +1,50 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks that a class has one pair of files: a.cc defines members of classes that a.h, or a.cc itself, declares.
+
+A class that needs a second file has a second class inside. APART lists those that are not yet split.
+"""
+
+import re
+
+import project
+
+CLASS = re.compile(r"^ *(?:template <[^;{]*> *)?(?:class|struct)(?: [A-Z_]+(?:\([^)]*\))?)? (\w+)[^;(]*{", re.M)
+MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?:\w+::)*~?\w+\(", re.M)
+APART = {
+    "server/decomposition/job_cancellation.cc", "server/mode_database/model_collection.cc",
+    "server/scene/scene_registry_objects.cc", "server/synthesis/bank/oscillator_bank_setup.cc",
+    "server/synthesis/bank/oscillator_bank_strikes.cc", "server/synthesis/mixer_buses.cc",
+    "server/synthesis/mixer_control.cc", "server/synthesis/mixer_overload.cc",
+    "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
+    "client_sdk/cpp/internal/grpc_client_runs.cc", "client_sdk/cpp/internal/grpc_client_streams.cc",
+}
+
+
+def declared(text):
+    return set(CLASS.findall(text))
+
+
+def check(root):
+    classes = {}
+    for path in project.cxx_files(root):
+        if path.suffix == ".h":
+            for name in declared(path.read_text()):
+                classes.setdefault((path.parent, name), set()).add(path.stem)
+    for path in project.cxx_files(root):
+        if path.suffix != ".cc":
+            continue
+        text = path.read_text()
+        own = declared(text)
+        for found in MEMBER.finditer(text):
+            stems = classes.get((path.parent, found[1]), set())
+            if stems and path.stem not in stems and found[1] not in own:
+                line = text.count("\n", 0, found.start()) + 1
+                name = path.relative_to(root)
+                if str(name) not in APART:
+                    yield f"{name}:{line}: defines a member of {found[1]}, which {sorted(stems)[0]}.h declares"
+                break
+
+
+if __name__ == "__main__":
+    project.run(check)
