@@ -66,6 +66,8 @@ class Client:
     def __init__(self, server):
         channel = grpc.insecure_channel(server)
         if token := os.environ.get("CARILLON_TOKEN"):
+            if not server.startswith(("unix:", "localhost:", "127.0.0.1:", "[::1]:")):
+                sys.exit(f"strike.py: without TLS the token would cross the network to {server} in clear")
             channel = grpc.intercept_channel(channel, Bearer(token))
         self.models = modal_model_service_pb2_grpc.ModalModelServiceStub(channel)
         self.jobs = decomposition_service_pb2_grpc.DecompositionServiceStub(channel)

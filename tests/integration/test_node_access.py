@@ -59,6 +59,10 @@ class NodeAccessTest(unittest.TestCase):
         self.assertEqual(self.run_program(self.roots), "CREDENTIAL_MISSING")
         self.assertEqual(self.run_program({**self.roots, "token": "guessed"}), "TOKEN_WRONG")
 
+    def test_a_proxy_for_the_network_is_not_asked_for_this_machine(self):
+        self.assertEqual(self.run_program({**self.roots, "token": TOKEN}, http_proxy="http://127.0.0.1:1", no_proxy="",
+                                          no_grpc_proxy=""), "done")
+
     def test_options_that_do_not_fit_together_are_named(self):
         self.assertIn("tlsKey", self.run_program({**self.roots, "tlsCertificate": "client.pem"}))
         self.assertIn("tlsRoots", self.run_program(self.client_files))

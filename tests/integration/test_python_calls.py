@@ -2,6 +2,10 @@
 """The Python package against the real daemon: what it is, scenes with ids, all jobs, and what a rendering tells."""
 
 import asyncio
+import os
+import subprocess
+import sys
+import tempfile
 import unittest
 
 import numpy
@@ -9,7 +13,7 @@ import numpy
 import carillon
 import meshes
 from carillon.v1 import audio_service_pb2
-from daemon import DaemonTest
+from daemon import Daemon, DaemonTest
 
 BAR = meshes.box(meshes.BAR_SIZE)
 POINT, IMPULSE, DURATION_S = (0.0, 0.008, 0.010), (0, 0, -0.002), 1e-4
@@ -244,6 +248,68 @@ class CallsTest(DaemonTest):
         accepted, peak, step_count = asyncio.run(use())
         self.assertEqual((accepted, step_count), (1, 1))
         self.assertGreater(peak, 1e-5)
+
+    def run_script(self, script, **environment):
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60,
+                              env={**os.environ, **environment})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout.split()
+
+    def test_a_pool_of_forked_processes_uses_the_connection_and_passes_refusals_on(self):
+        said = self.run_script(f"""
+import multiprocessing, carillon
+c = carillon.connect({self.c.server!r})
+scene = c.scene()
+stream = scene.stream(step=0.01)
+stream.step(0.0)
+def told(stream):
+    try:
+        stream.step(1.0)
+    except carillon.CarillonError as error:
+        return error.reason
+def ask(text):
+    return c.model(text).mode_count, told(stream)
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    print(*pool.map(ask, ["bar"] * 4)[3])
+    try:
+        pool.map(ask, ["bar", "bell"])
+    except carillon.CarillonError as error:
+        print(error.reason)
+stream.step(0.01)
+print(stream.close().step_count)
+c.close()
+""")
+        self.assertEqual(said, [str(self.model.mode_count), "CONTACT_STREAM_ENDED", "MODAL_MODEL_NOT_FOUND", "2"])
+
+    def test_a_fork_that_grpc_does_not_survive_is_refused_in_the_child(self):
+        said = self.run_script(f"""
+import os, grpc, carillon
+c = carillon.connect({self.c.server!r})
+c.status()
+child = os.fork()
+if child == 0:
+    for call in c.status, carillon.connect:
+        try:
+            call()
+        except RuntimeError as error:
+            os.write(1, b"refused " if "import carillon first" in str(error) else b"")
+    os._exit(0)
+os.waitpid(child, 0)
+""", GRPC_ENABLE_FORK_SUPPORT="")
+        self.assertEqual(said, ["refused", "refused"])
+
+    def test_a_proxy_for_the_network_is_not_asked_for_this_machine(self):
+        with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+            daemon = Daemon(folder, "--listen", "127.0.0.1:0")
+            self.addCleanup(daemon.stop)
+            said = self.run_script(f"""
+import asyncio, carillon
+async def ask():
+    async with carillon.aio.connect({daemon.listening[1].split()[-1]!r}) as c:
+        return await c.info()
+print(carillon.connect({daemon.listening[1].split()[-1]!r}).info().version, asyncio.run(ask()).version)
+""", http_proxy="http://127.0.0.1:1", no_proxy="")
+        self.assertEqual(said, [carillon.__version__] * 2)
 
     def test_no_transfer_means_no_decay_by_radiation(self):
         numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))

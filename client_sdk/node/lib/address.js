@@ -2,6 +2,7 @@
 'use strict';
 
 const fs = require('fs');
+const net = require('net');
 const os = require('os');
 const path = require('path');
 
@@ -19,4 +20,11 @@ function defaultServer() {
   return `unix:${!fs.existsSync(own) && fs.existsSync(SYSTEM_SOCKET) ? SYSTEM_SOCKET : own}`;
 }
 
-module.exports = { defaultServer };
+/** Whether nothing that is sent to the address leaves this machine: a Unix socket, or an address of loopback. */
+function isLocal(server) {
+  if (/^unix(-abstract)?:/.test(server)) return true;
+  const host = server.replace(/^(dns|ipv4|ipv6):(\/\/[^/]*\/)?/, '').replace(/:[^:]*$/, '').replace(/^\[(.*)\]$/, '$1');
+  return host === 'localhost' || host === '::1' || (net.isIPv4(host) && host.startsWith('127.'));
+}
+
+module.exports = { defaultServer, isLocal };

@@ -7,7 +7,7 @@ const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObjec
   refuseUnknown } = require('./checks');
 const { frameInWords, given, toPose } = require('./contacts');
 const { services } = require('./contract');
-const { channelCredentials, tokenInterceptors } = require('./credentials');
+const { channelCredentials, channelOptions } = require('./credentials');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
@@ -64,10 +64,10 @@ function requestFor(given, more) {
 
 /** A connection. Its process can end when it is closed. */
 class Client {
-  constructor(server, { token, ...tlsFiles } = {}) {
+  constructor(server, options = {}) {
     this.server = server;
-    this.credentials = channelCredentials(tlsFiles);
-    this.interceptors = tokenInterceptors(token);
+    this.credentials = channelCredentials(options);
+    this.options = channelOptions(server, options);
     this.stubs = new Map();
     this.openCalls = new Set();
   }
@@ -76,8 +76,7 @@ class Client {
   stub(service) {
     if (this.isClosed) throw new Error('this client has been closed; connect again');
     if (!this.stubs.has(service)) {
-      const options = { 'grpc.max_receive_message_length': -1, interceptors: this.interceptors };
-      this.stubs.set(service, new services[service](this.server, this.credentials, options));
+      this.stubs.set(service, new services[service](this.server, this.credentials, this.options));
     }
     return this.stubs.get(service);
   }

@@ -3,6 +3,8 @@
 
 const fs = require('fs');
 const grpc = require('@grpc/grpc-js');
+const { isLocal } = require('./address');
+const { CarillonError } = require('./errors');
 
 /** Adds the token to every call. */
 function bearer(token) {
@@ -23,9 +25,18 @@ function channelCredentials({ tlsRoots, tlsCertificate, tlsKey }) {
   return grpc.credentials.createSsl(roots, key, certificate);
 }
 
-/** The interceptors of a channel whose caller shows `token`; by default that of $CARILLON_TOKEN, if there is one. */
-function tokenInterceptors(token = process.env.CARILLON_TOKEN) {
-  return token ? [bearer(token)] : [];
+/**
+ * The options of a channel to `server` whose caller shows `token`; by default that of $CARILLON_TOKEN, if there is one.
+ * Throws CarillonError (TLS_REQUIRED) if the token would cross the network in clear.
+ */
+function channelOptions(server, { token = process.env.CARILLON_TOKEN, tlsRoots }) {
+  if (token && !tlsRoots && !isLocal(server)) {
+    throw new CarillonError('TLS_REQUIRED', `the token would cross the network to ${server} in clear; give tlsRoots, or ` +
+      'the address of a daemon on this machine, or no token');
+  }
+  return { 'grpc.max_receive_message_length': -1, interceptors: token ? [bearer(token)] : [],
+    // A proxy reaches another machine than this one.
+    ...(isLocal(server) ? { 'grpc.enable_http_proxy': 0 } : {}) };
 }
 
-module.exports = { channelCredentials, tokenInterceptors };
+module.exports = { channelCredentials, channelOptions };

@@ -47,6 +47,17 @@ function refused(expected, content) {
     || assert.fail(error.message));
 }
 
+test('a token crosses no network in clear', () => {
+  for (const server of ['10.0.0.2:50051', 'dns:///example.org:1', '127.example.org:1', '[2001:db8::1]:1', 'ipv4:10.0.0.2:1']) {
+    assert.throws(() => carillon.connect(server, { token: 'secret' }), { reason: 'TLS_REQUIRED' });
+    carillon.connect(server).close();
+  }
+  for (const server of ['unix:/nowhere', 'unix-abstract:carillon', 'localhost:1', '127.0.0.2:1', '[::1]:1', 'ipv4:127.0.0.1:1',
+    'ipv6:[::1]:1', 'dns:///localhost:1']) {
+    carillon.connect(server, { token: 'secret' }).close();
+  }
+});
+
 test('a stream in time is silent', async () => assert.deepEqual(await told({ accepted_count: 7 }), []));
 
 test('late contacts, new mappings and lost steps are told once', async () => {

@@ -4,9 +4,12 @@
 
 import asyncio
 import functools
+import os
+import pickle
 import threading
 import unittest
 import warnings
+from unittest import mock
 
 import grpc
 import numpy
@@ -311,6 +314,32 @@ class RefusalsTest(MessagesTest):
                 self.c.create_model(MESH, "oak", **eval(f"dict({expected})"))
 
 
+class ErrorsTest(unittest.TestCase):
+    def test_a_refusal_can_be_sent_to_another_process(self):
+        remedy = error_pb2.Remedy(field="settings.mesh.repair", value="true")
+        for kind in carillon.CarillonError, carillon.ServerUnavailable:
+            error = pickle.loads(pickle.dumps(kind("MESH_NOT_CLOSED", "it is open", {"index": "1"}, [remedy])))
+            self.assertIs(type(error), kind)
+            self.assertEqual((str(error), error.reason, error.message, error.metadata, error.remedies),
+                             ("MESH_NOT_CLOSED: it is open", "MESH_NOT_CLOSED", "it is open", {"index": "1"}, [remedy]))
+
+    def test_a_token_crosses_no_network_in_clear(self):
+        with mock.patch.dict(os.environ, CARILLON_TOKEN="secret"):
+            for server in ("10.0.0.2:50051", "dns:///example.org:1", "127.example.org:1", "[2001:db8::1]:1",
+                           "ipv4:10.0.0.2:1"):
+                with self.assertRaises(carillon.CarillonError) as refused:
+                    carillon.connect(server)
+                self.assertEqual(refused.exception.reason, "TLS_REQUIRED")
+            for server in ("unix:/nowhere", "unix-abstract:carillon", "localhost:1", "127.0.0.2:1", "[::1]:1",
+                           "ipv4:127.0.0.1:1", "ipv6:[::1]:1", "dns:///localhost:1"):
+                carillon.connect(server).close()
+        with mock.patch.dict(os.environ):
+            os.environ.pop("CARILLON_TOKEN", None)
+            carillon.connect("10.0.0.2:50051").close()
+            with self.assertRaises(carillon.CarillonError):
+                carillon.connect("10.0.0.2:50051", token="secret")
+
+
 class WaitingTest(MessagesTest):
     def test_progress_says_why_a_job_waits(self):
         state, cause = decomposition_pb2.JOB_STATE_QUEUED, "WAIT_CAUSE_"
@@ -383,7 +412,7 @@ class AioTest(unittest.TestCase):
         aio = carillon.aio
         for kind, plain in ((aio.AsyncClient, carillon.Client), (aio.AsyncScene, carillon.Scene),
                             (aio.AsyncContactStream, carillon.ContactStream)):
-            names = {name for name in vars(plain) if not name.startswith("_") and name != "cancellable"}
+            names = {name for name in vars(plain) if not name.startswith("_") and name not in ("cancellable", "reopen")}
             self.assertEqual(names - set(dir(kind)), set(), kind.__name__)
 
     def test_all_that_asks_the_daemon_is_a_coroutine(self):

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the daemon listens unless the caller says otherwise."""
 
+import contextlib
+import ipaddress
 import os
 import pathlib
+import re
 
 SYSTEM_SOCKET = pathlib.Path("/run/carillon/carillond.sock")
 
@@ -20,3 +23,13 @@ def default_server() -> str:
     except PermissionError:
         use_system = False
     return f"unix:{SYSTEM_SOCKET if use_system else own}"
+
+
+def is_local(server: str) -> bool:
+    """Whether nothing that is sent to the address leaves this machine: a Unix socket, or an address of loopback."""
+    if server.startswith(("unix:", "unix-abstract:")):
+        return True
+    host = re.sub(r"^(dns|ipv4|ipv6):(//[^/]*/)?", "", server).rpartition(":")[0].strip("[]")
+    with contextlib.suppress(ValueError):
+        return ipaddress.ip_address(host).is_loopback
+    return host == "localhost"

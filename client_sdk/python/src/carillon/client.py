@@ -15,8 +15,8 @@ from typing import Any, Optional
 import grpc
 import numpy
 
-from carillon import checks, contacts, errors, meshes, progress, summaries
-from carillon.address import default_server
+from carillon import checks, contacts, errors, forks, meshes, progress, summaries
+from carillon.address import default_server, is_local
 from carillon.authorization import authorized
 from carillon.contacts import PoseLike, to_pose
 from carillon.jobs import Job, to_states
@@ -59,15 +59,26 @@ class Client:
                  tls_certificate: str | os.PathLike[str] | None = None,
                  tls_key: str | os.PathLike[str] | None = None):
         self.server = server
+        token = token or os.environ.get("CARILLON_TOKEN")
+        if token and tls_roots is None and not is_local(server):
+            raise errors.CarillonError("TLS_REQUIRED", f"the token would cross the network to {server} in clear; give "
+                                       "tls_roots, or the address of a daemon on this machine, or no token")
         options = [("grpc.max_receive_message_length", -1)]
+        if is_local(server):
+            options.append(("grpc.enable_http_proxy", 0))  # a proxy reaches another machine than this one
         if tls_roots is None:
-            self._channel = grpc.insecure_channel(server, options)
+            self._make_channel = lambda: authorized(grpc.insecure_channel(server, options), token)
         else:
             roots, key, certificate = (path and pathlib.Path(path).read_bytes()
                                        for path in (tls_roots, tls_key, tls_certificate))
             credentials = grpc.ssl_channel_credentials(roots, key, certificate)
-            self._channel = grpc.secure_channel(server, credentials, options)
-        self._channel = authorized(self._channel, token or os.environ.get("CARILLON_TOKEN"))
+            self._make_channel = lambda: authorized(grpc.secure_channel(server, credentials, options), token)
+        forks.open_in_children(self)
+        self.reopen()
+
+    def reopen(self) -> None:
+        """Opens a new connection, as a process does that was forked."""
+        self._channel = self._make_channel()
         self.models_stub = modal_model_service_pb2_grpc.ModalModelServiceStub(self._channel)
         self.jobs_stub = decomposition_service_pb2_grpc.DecompositionServiceStub(self._channel)
         self.scenes_stub = scene_service_pb2_grpc.SceneServiceStub(self._channel)

@@ -8,6 +8,7 @@ import inspect
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import grpc
 
@@ -39,6 +40,9 @@ class CarillonError(Exception):
         self.message = message
         self.metadata = metadata or {}
         self.remedies = list(remedies)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.reason, self.message, self.metadata, self.remedies)
 
 
 class ServerUnavailable(CarillonError):

@@ -235,7 +235,12 @@ class _OpenStreams:
     def __init__(self) -> None:
         self.streams: set[ContactStream] = set()
         atexit.register(self.warn)
-        os.register_at_fork(after_in_child=self.streams.clear)
+        os.register_at_fork(after_in_child=self.leave)
+
+    def leave(self) -> None:
+        """Closes the streams in a forked process, where no thread sends their steps."""
+        for stream in list(self.streams):
+            stream._end()
 
     def warn(self) -> None:
         for stream in list(self.streams):

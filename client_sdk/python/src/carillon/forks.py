@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs that fork, such as those with a Pool of multiprocessing. gRPC keeps its threads in order over a fork only if
+a variable of the environment says so when it is imported; this module is therefore imported before gRPC."""
+
+from __future__ import annotations
+
+import os
+import sys
+import weakref
+from typing import Protocol
+
+VARIABLE = "GRPC_ENABLE_FORK_SUPPORT"
+
+if "grpc" not in sys.modules:
+    os.environ.setdefault(VARIABLE, "1")
+_is_supported = os.environ.get(VARIABLE, "").lower() in ("1", "true", "yes", "y")
+
+
+class Connection(Protocol):
+    """What is opened anew in a child."""
+
+    def reopen(self) -> None:
+        ...
+
+
+_connections: weakref.WeakSet[Connection] = weakref.WeakSet()
+_is_lost = False
+
+
+def open_in_children(connection: Connection) -> None:
+    """Has a connection opened anew in each process that this one forks. Raises RuntimeError in a child of a process
+    that had connections and whose gRPC does not support forks."""
+    refuse()
+    _connections.add(connection)
+
+
+def refuse() -> None:
+    """Raises RuntimeError where calls of gRPC would never end."""
+    if _is_lost:
+        raise RuntimeError("this process was forked by one that had imported grpc before carillon, so that its calls "
+                           f"would not end; import carillon first, set {VARIABLE}=1, or start processes by "
+                           'multiprocessing.set_start_method("spawn")')
+
+
+def _in_child() -> None:
+    global _is_lost
+    if not _is_supported and _connections:
+        _is_lost = True
+    for connection in list(_connections):
+        connection.reopen()
+
+
+os.register_at_fork(after_in_child=_in_child)
