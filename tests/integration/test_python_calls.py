@@ -136,16 +136,16 @@ class CallsTest(DaemonTest):
         with self.c.scene() as scene:
             scene.add(self.model, handle=1)
             answers = self.c.audio_stub.Listen(audio_service_pb2.ListenRequest(scene=scene.name))
-            with self.c.cancellable(answers):
-                rate_hz = next(answers).format.sample_rate_hz
-                # The delay lets all steps come at once.
-                with scene.stream(step_s, delay=0.5) as stream:
-                    for time_s, content in steps:
-                        stream.step(time_s, **content)
-                for answer in answers:
-                    samples = numpy.frombuffer(answer.block.samples, "<f4")
-                    if samples.any():
-                        break
+            self.addCleanup(answers.cancel)
+            rate_hz = next(answers).format.sample_rate_hz
+            # The delay lets all steps come at once.
+            with scene.stream(step_s, delay=0.5) as stream:
+                for time_s, content in steps:
+                    stream.step(time_s, **content)
+            for answer in answers:
+                samples = numpy.frombuffer(answer.block.samples, "<f4")
+                if samples.any():
+                    break
         begin_frame = answer.block.first_frame + int(numpy.flatnonzero(samples)[0])
         # The pulse begins half a duration before the time of the blow.
         return (begin_frame - stream.report.first_frame) / rate_hz - 0.5 + DURATION_S / 2
@@ -219,11 +219,11 @@ class CallsTest(DaemonTest):
                 model = await c.model("bar")
                 trace = carillon.Trace()
                 trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
-                share = carillon.aio_threads.most_renderings(c.sync)
+                limits = (await c.info()).limits
                 sounds = await asyncio.gather(
                     *(model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=0.1) for _ in range(8)),
                     *(c.render(trace, tail_s=0.1) for _ in range(8)))
-                return share, {sound.peak for sound in sounds}
+                return int(limits.rendering_count * limits.client_share), {sound.peak for sound in sounds}
 
         share, peaks = asyncio.run(render())
         self.assertEqual((share, len(peaks)), (4, 1))

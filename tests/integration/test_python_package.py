@@ -339,7 +339,7 @@ class AioTest(PackageTest):
                 self.assertEqual(stream.report.step_count, 1)
                 self.assertIsNone(stream.rejection)
                 self.assertEqual([item.handle for item in await scene.objects()], [bar.handle])
-                self.assertIn(scene.sync.name, [found.sync.name for found in await c.scenes()])
+                self.assertIn(scene.name, [found.name for found in await c.scenes()])
                 await scene.remove(bar)
                 return listening.result()
 

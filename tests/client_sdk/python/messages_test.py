@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
 
-import asyncio
 import functools
+import inspect
 import os
 import pickle
-import threading
+import types
 import unittest
 import warnings
 from unittest import mock
@@ -77,10 +77,11 @@ class WarningsTest(unittest.TestCase):
                                "frame")
 
     def test_a_body_of_a_likely_wrong_unit_is_told_once(self):
-        job = carillon.Job(None, decomposition_pb2.Job())
-        texts = []
+        texts, before = [], decomposition_pb2.Job()
         for extent_m in (0, 20, 202, 202):
-            texts.append(warnings_of(job._note, decomposition_pb2.Job(progress={"extent_m": extent_m})))
+            job = decomposition_pb2.Job(progress={"extent_m": extent_m})
+            texts.append(warnings_of(carillon.job_calls.warn_of_extent, before, job))
+            before = job
         self.assertEqual([len(text) for text in texts], [0, 0, 1, 0])
         self.assertRegex(texts[2][0], '^the body is 202 m across; .*unit="mm"$')
 
@@ -132,7 +133,7 @@ class RefusalsTest(MessagesTest):
         one, two = (carillon.SoundingObject(carillon.Scene(self.c, f"scenes/{i}"),
                                             scene_service_pb2.SoundingObject(handle=1)) for i in (1, 2))
         point, impulse = [[0, 0, 0]], [[0, 0, 1]]
-        check = carillon.scenes._refuse_other_scenes
+        check = carillon.streams._refuse_other_scenes
         check(carillon.Impulses([one], point, impulse, second_objects=[3]), "scenes/1")
         for columns in (carillon.Impulses(two, point, impulse), carillon.Impulses([1], point, impulse,
                                                                                   second_objects=[two])):
@@ -364,11 +365,25 @@ class WaitingTest(MessagesTest):
             yield from first
             raise Lost
 
+        class Call:
+            def __init__(self, *first):
+                self.answers = answers(*first)
+
+            def __iter__(self):
+                return self.answers
+
+            def cancel(self):
+                pass
+
         begin = audio_service_pb2.ListenResponse(format={"sample_rate_hz": 48000, "channel_count": 1})
-        for take in (lambda: carillon.client.Recording(answers(begin), "unix:/nowhere").take(1),
-                     carillon.scenes.TraceRecording(answers(), "unix:/nowhere").take):
+        self.c.audio_stub = types.SimpleNamespace(Listen=lambda request: Call(begin))
+        self.c.contacts_stub = types.SimpleNamespace(
+            RecordContacts=lambda request: Call(contact_service_pb2.RecordContactsResponse()))
+        for block, arguments in ((self.c.recording(), (1,)),
+                                 (carillon.Scene(self.c, "scenes/1").recording_contacts(), ())):
             with self.assertRaisesRegex(carillon.ServerUnavailable, "no daemon answers at unix:/nowhere"):
-                take()
+                with block as record:
+                    record.take(*arguments)
 
 
 class ShortFormsTest(MessagesTest):
@@ -384,7 +399,7 @@ class ShortFormsTest(MessagesTest):
         model = carillon.Model(self.c, summary)
         for item, expected in (
                 (self.c, "<Client of unix:/nowhere>"), (scene, "<Scene scenes/1 of unix:/nowhere>"),
-                (model, "<Model bell: 1 mode>"), (carillon.aio.AsyncModel(model), "<AsyncModel bell: 1 mode>"),
+                (model, "<Model bell: 1 mode>"), (carillon.aio.AsyncModel(self.c, summary), "<AsyncModel bell: 1 mode>"),
                 (summary, "<ModalModelSummary bell: 1 mode, 12 nodes>"),
                 (rendering, "<RenderSummary: 4800 frames, 1 contact, peak 2 Pa>"),
                 (trace, "<Trace: 1 object, 1 step, to 0.5 s>"),
@@ -398,30 +413,23 @@ class ShortFormsTest(MessagesTest):
 
 
 class AioTest(unittest.TestCase):
-    def test_calls_that_wait_do_not_keep_others_waiting(self):
-        # Each call ends when all are running, as many recordings would that wait for each other.
-        count = 100
-        barrier = threading.Barrier(count)
-
-        async def together():
-            await asyncio.gather(*(carillon.aio.in_thread(barrier.wait, 60) for _ in range(count)))
-
-        asyncio.run(together())
-
-    def test_every_call_has_its_like_in_asyncio(self):
+    def test_every_call_has_its_like_in_asyncio_and_all_that_asks_the_daemon_is_a_coroutine(self):
         aio = carillon.aio
+        at_once = {"stream", "recording", "recording_contacts", "cancel", "in_turn", "forget", "step", "send"}
         for kind, plain in ((aio.AsyncClient, carillon.Client), (aio.AsyncScene, carillon.Scene),
-                            (aio.AsyncContactStream, carillon.ContactStream)):
-            names = {name for name in vars(plain) if not name.startswith("_") and name not in ("cancellable", "reopen")}
-            self.assertEqual(names - set(dir(kind)), set(), kind.__name__)
-
-    def test_all_that_asks_the_daemon_is_a_coroutine(self):
-        aio = carillon.aio
-        for kind, plain in ((aio.AsyncModel, carillon.Model), (aio.AsyncJob, carillon.Job),
-                            (aio.AsyncObject, carillon.SoundingObject)):
-            for name, member in vars(plain).items():
-                if not name.startswith("_") and not isinstance(member, property) and not name.startswith("plot_"):
-                    self.assertTrue(asyncio.iscoroutinefunction(getattr(kind, name)), f"{kind.__name__}.{name}")
+                            (aio.AsyncContactStream, carillon.ContactStream), (aio.AsyncModel, carillon.Model),
+                            (aio.AsyncJob, carillon.Job), (aio.AsyncObject, carillon.SoundingObject),
+                            (aio.AsyncRecording, carillon.recordings.Recording),
+                            (aio.AsyncTraceRecording, carillon.recordings.TraceRecording)):
+            for name in dir(plain):
+                member = inspect.getattr_static(plain, name)
+                if name.startswith(("_", "plot_")) or name in at_once or not callable(getattr(plain, name)):
+                    continue
+                with self.subTest(kind=kind.__name__, name=name):
+                    self.assertFalse(inspect.iscoroutinefunction(getattr(plain, name)) and
+                                     isinstance(member, (carillon.faces.call, carillon.faces.items)))
+                    like = getattr(kind, name)
+                    self.assertTrue(inspect.iscoroutinefunction(like) or inspect.isasyncgenfunction(like))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 """Which messages a contact stream of the Python package makes of the steps that wait for a slow network."""
 
 import math
-import types
 import unittest
 
 import numpy
@@ -15,19 +14,26 @@ START = contact_service_pb2.ContactStreamStart(scene="scenes/1", step_s=0.01)
 
 
 class SlowStub:
-    """Keeps the requests of a stream, which nobody takes before the test does."""
+    """Keeps the requests of a stream, which nobody takes before the test does, and is the daemon's answer, too: none."""
 
     def StreamContacts(self, requests):
         self.requests = requests
+        return self
+
+    def __iter__(self):
         return iter(())
+
+    def cancel(self):
+        pass
 
 
 class StreamTest(unittest.TestCase):
     def requests_of(self, row_counts):
         """The requests after the start, for steps that all wait and have these numbers of rows."""
         stub = SlowStub()
-        client = types.SimpleNamespace(server="unix:/nowhere", contacts_stub=stub)
-        stream = carillon.ContactStream(types.SimpleNamespace(client=client), START)
+        client = carillon.connect("unix:/nowhere")
+        client.contacts_stub = stub
+        stream = carillon.ContactStream(client, START)
         for number, count in enumerate(row_counts):
             row = contact_pb2.Impulse(object=1, duration_s=1e-3)
             stream.send(contact_pb2.ContactStep(time_s=0.01 * number, impulses=[row] * count))
@@ -38,8 +44,9 @@ class StreamTest(unittest.TestCase):
 
     def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_at_once_and_the_stream_goes_on(self):
         stub = SlowStub()
-        client = types.SimpleNamespace(server="unix:/nowhere", contacts_stub=stub)
-        stream = carillon.ContactStream(types.SimpleNamespace(client=client), START)
+        client = carillon.connect("unix:/nowhere")
+        client.contacts_stub = stub
+        stream = carillon.ContactStream(client, START)
 
         def refused(expected, send, argument):
             with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:

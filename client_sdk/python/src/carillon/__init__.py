@@ -23,8 +23,9 @@ from carillon.jobs import Job
 from carillon.materials import material
 from carillon.meshes import MeshFile
 from carillon.models import Model
-from carillon.scenes import ContactStream, Scene, SoundingObject
+from carillon.scenes import Scene, SoundingObject
 from carillon.sound import Sound
+from carillon.streams import ContactStream
 from carillon.traces import Trace
 from carillon.version import __version__
 

@@ -326,8 +326,7 @@ def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:
     for name in ("objects", "second_objects"):
         given = getattr(columns, name, None)
         for item in given if isinstance(given, (list, tuple)) else [given]:
-            # An object of asyncio stands for a synchronous one.
-            scene = getattr(getattr(item, "sync", item), "scene", None)
+            scene = getattr(item, "scene", None)
             if scene is not None:
                 yield name, scene.name
 

@@ -17,10 +17,9 @@ _is_supported = os.environ.get(VARIABLE, "").lower() in ("1", "true", "yes", "y"
 
 
 class Connection(Protocol):
-    """What is opened anew in a child."""
+    """What opens anew in a child, at its next call."""
 
-    def reopen(self) -> None:
-        ...
+    def forget(self) -> None: ...
 
 
 _connections: weakref.WeakSet[Connection] = weakref.WeakSet()
@@ -28,8 +27,7 @@ _is_lost = False
 
 
 def open_in_children(connection: Connection) -> None:
-    """Has a connection opened anew in each process that this one forks. Raises RuntimeError in a child of a process
-    that had connections and whose gRPC does not support forks."""
+    """Has a connection opened anew in each process that this one forks."""
     refuse()
     _connections.add(connection)
 
@@ -46,8 +44,9 @@ def _in_child() -> None:
     global _is_lost
     if not _is_supported and _connections:
         _is_lost = True
+        return
     for connection in list(_connections):
-        connection.reopen()
+        connection.forget()
 
 
 os.register_at_fork(after_in_child=_in_child)

@@ -8,7 +8,8 @@ from typing import Any, Literal, Optional, Protocol, Union
 
 import numpy
 
-from carillon import checks
+from carillon import checks, errors
+from carillon.connection import Connection
 from carillon.v1 import material_pb2, modal_model_service_pb2, radiation_pb2
 
 Material = Union[str, material_pb2.Material]
@@ -63,12 +64,32 @@ def named(model: ModelLike | str, given: Optional[Material]) -> tuple[str, Optio
     return name, None if chosen is None else to_message(chosen)
 
 
-def resolved(given: material_pb2.Material, catalogue: dict[str, material_pb2.Material]) -> material_pb2.Material:
+async def catalogue(connection: Connection) -> dict[str, material_pb2.Material]:
+    """The daemon's materials by name, which a connection asks for once."""
+    if connection.catalogue is None:
+        request = modal_model_service_pb2.ListMaterialsRequest()
+        answer = await connection.ask(connection.models_stub.ListMaterials, request)
+        connection.catalogue = {item.name: item.material for item in answer.materials}
+    return connection.catalogue
+
+
+async def resolve(connection: Connection, given: Material) -> material_pb2.Material:
+    """Replaces the name of a material by its figures."""
+    message = to_message(given)
+    known = await catalogue(connection)
+    if message.preset and message.preset not in known:
+        raise errors.CarillonError("UNKNOWN_MATERIAL", f"there is no material \"{message.preset}\"; "
+                                   + (checks.suggestion(message.preset, known)
+                                      or "Client.materials has all of them"))
+    return resolved(message, known)
+
+
+def resolved(given: material_pb2.Material, known: dict[str, material_pb2.Material]) -> material_pb2.Material:
     """Replaces the name of a material by the figures of the catalogue, which the given figures override."""
     if not given.preset:
         return given
     made = material_pb2.Material()
-    made.CopyFrom(catalogue[given.preset])
+    made.CopyFrom(known[given.preset])
     if given.loss_factor:
         del made.loss_factor[:]
     made.MergeFrom(given)

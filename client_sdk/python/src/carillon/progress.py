@@ -68,12 +68,12 @@ class ProgressBar:
             self._bar.close()
 
 
-def observer(progress: Progress) -> tuple[OnProgress, Callable[[], None]]:
+def observer(progress: Progress, shows: bool) -> tuple[OnProgress, Callable[[], None]]:
     """Returns the function to call for each state of a job, and the one to call at the end. `progress` is such a
-    function, True for a bar, False for none, and None for a bar if stderr is a terminal or a notebook."""
+    function, True for a bar, False for none, and None for a bar if `shows` and stderr is a terminal or a notebook."""
     if callable(progress):
         return progress, lambda: None
-    if progress or (progress is None and _is_watched()):
+    if progress or (progress is None and shows and _is_watched()):
         bar = ProgressBar()
         return bar, bar.close
     return lambda job: None, lambda: None

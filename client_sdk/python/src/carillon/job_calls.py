@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The calls about decomposition jobs, on messages of the contract."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncGenerator, Callable, Iterable
+from typing import Any, Optional
+
+from carillon import checks, errors, progress
+from carillon.connection import Connection
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2
+
+# The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
+LIKELY_EXTENT_M = 20
+
+
+def to_states(states: Iterable[str]) -> list[Any]:
+    """The values of the contract for states such as "failed"."""
+    listed = [states] if isinstance(states, str) else states
+    return [checks.choice(decomposition_pb2.JobState, "JOB_STATE_", "an entry of states", state) for state in listed]
+
+
+def state_of(job: decomposition_pb2.Job) -> str:
+    return decomposition_pb2.JobState.Name(job.state).removeprefix("JOB_STATE_").lower()
+
+
+def is_transfer(job: decomposition_pb2.Job) -> bool:
+    return bool(job.kind == decomposition_pb2.JOB_KIND_TRANSFER)
+
+
+async def listed(connection: Connection, states: Iterable[str] = (),
+                 label_contains: str = "") -> AsyncGenerator[decomposition_pb2.Job, None]:
+    """Yields the jobs that match, newest first, a page at a time."""
+    request = decomposition_service_pb2.ListJobsRequest(states=to_states(states), label_contains=label_contains)
+    while True:
+        page = await connection.ask(connection.jobs_stub.ListJobs, request)
+        for job in page.jobs:
+            yield job
+        if not page.next_page_token:
+            return
+        request.page_token = page.next_page_token
+
+
+async def follow(connection: Connection, job: decomposition_pb2.Job, timeout: Optional[float],
+                 note: Callable[[decomposition_pb2.Job], None]) -> decomposition_pb2.Job:
+    """Follows a job to its end, gives `note` each of its states, and returns the last. Raises CarillonError if the job
+    fails, or if it has not ended after `timeout` seconds (DEADLINE_EXCEEDED)."""
+    request = decomposition_service_pb2.WatchJobRequest(name=job.name)
+    try:
+        async for answer in connection.answers(connection.jobs_stub.WatchJob, request, timeout):
+            warn_of_extent(job, answer.job)
+            job = answer.job
+            note(job)
+    except errors.CarillonError as error:
+        if error.reason != "DEADLINE_EXCEEDED":
+            raise
+        doing = f"{state_of(job)} ({progress.activity(job)})" if state_of(job) == "queued" else state_of(job)
+        raise errors.CarillonError(error.reason, f"{job.label or job.name} is {doing} and has not ended after "
+                                   f"{timeout:.3g} s; wait longer, or cancel the job") from error
+    if job.state == decomposition_pb2.JOB_STATE_CANCELLED:
+        raise errors.CarillonError("JOB_CANCELLED", f"{job.name} was cancelled; create the model again")
+    if job.state != decomposition_pb2.JOB_STATE_SUCCEEDED:
+        raise errors.from_info(job.error)
+    return job
+
+
+def warn_of_extent(before: decomposition_pb2.Job, job: decomposition_pb2.Job) -> None:
+    """Warns once of a body so large that its unit is likely to be wrong."""
+    if job.progress.extent_m > LIKELY_EXTENT_M >= before.progress.extent_m:
+        errors.warn_of_unit(job.progress.extent_m)
