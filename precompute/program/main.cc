@@ -174,6 +174,7 @@ int Main(int argc, char** argv) {
   OpenStandardStreams();
   RestartWithFastBlas(argv);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGCHLD, SIG_DFL);  // the ends of meshing processes are lost while it is ignored
   const absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
   if (!asked.ok()) {
     // The options could not be read, so --json is looked for by itself.

@@ -13,6 +13,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <ctime>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 #include <system_error>
@@ -140,6 +142,7 @@ void ResetSignals() {
   signal(SIGPIPE, SIG_DFL);
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
+  signal(SIGCHLD, SIG_DFL);
 }
 
 // Copies the descriptors out of the way first, because one may have the number that another gets.
@@ -172,6 +175,25 @@ bool ArrangeDescriptors(std::array<int, 4> descriptors) {
   const int error = errno;
   [[maybe_unused]] const ssize_t written = write(failure, &error, sizeof error);
   _exit(kNotExecuted);
+}
+
+/// While a process ignores SIGCHLD, the kernel reaps its children before it can learn how they
+/// ended.
+void StopIgnoringChildren() {
+  struct sigaction action {};
+  if (sigaction(SIGCHLD, nullptr, &action) == 0 && action.sa_handler == SIG_IGN) {
+    signal(SIGCHLD, SIG_DFL);
+  }
+}
+
+/// Returns the state of a thread, a letter that proc(5) explains, or 0 if it cannot be read. The
+/// name before the state may contain any character, also a bracket.
+char StateOfThread(const std::filesystem::path& folder) {
+  std::ifstream stat(folder / "stat");
+  std::string line;
+  std::getline(stat, line);
+  const size_t name_end = line.rfind(") ");
+  return name_end == std::string::npos ? '\0' : line[name_end + 2];
 }
 
 }  // namespace
@@ -216,6 +238,7 @@ std::string Pipe::Read(size_t limit) {
 absl::StatusOr<ChildProcess> ChildProcess::Start(const ChildCommand& command) {
   ASSIGN_OR_RETURN(Pipe failure, Pipe::Make());
   const Preparation prepared = Prepare(command, failure.write_end());
+  StopIgnoringChildren();
   const pid_t pid = fork();
   if (pid < 0) return NotStarted(errno);
   if (pid == 0) RunInChild(prepared);
@@ -259,6 +282,25 @@ uint64_t ChildProcess::ResidentBytes() const {
   return resident_pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
+std::chrono::nanoseconds ChildProcess::ProcessorTime() const {
+  clockid_t clock{};
+  timespec time{};
+  if (clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &time) != 0) return {};
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+
+bool ChildProcess::Sleeps() const {
+  std::error_code error;
+  bool sleeps = false;
+  for (const auto& thread :
+       std::filesystem::directory_iterator(absl::StrCat("/proc/", pid_, "/task"), error)) {
+    const char state = StateOfThread(thread.path());
+    if (state == 'R' || state == 'D') return false;
+    sleeps = sleeps || state != '\0';
+  }
+  return sleeps;
+}
+
 std::optional<ProcessEnd> ChildProcess::Reap() {
   siginfo_t end{};
   const auto id = static_cast<id_t>(pid_);
@@ -267,9 +309,8 @@ std::optional<ProcessEnd> ChildProcess::Reap() {
   }
   // This comes before the process is reaped, while no other process can get the group's number.
   if (leads_group_) Kill();
-  const bool reaped = waitid(P_PID, id, &end, WEXITED) == 0;
+  waitid(P_PID, id, &end, WEXITED);
   pid_ = -1;
-  if (!reaped) return ProcessEnd{false, SIGCHLD};  // SIGCHLD is ignored: the end is not known
   return ProcessEnd{end.si_code == CLD_EXITED, end.si_status};
 }
 

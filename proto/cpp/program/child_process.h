@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstddef>
 #include <cstdint>
@@ -74,9 +75,10 @@ struct ChildCommand {
 /// set a death signal, priority or processors.
 class ChildProcess {
  public:
-  /// Starts the program and returns once it runs. Errors: ResourceExhausted (WORKER_NOT_STARTED: no
-  /// process or descriptor is left), FailedPrecondition (WORKER_NOT_FOUND: the program cannot be
-  /// executed).
+  /// Starts the program and returns once it runs. If this process ignores SIGCHLD, which it
+  /// inherits from a parent that does, the call ends that, because the ends of children would be
+  /// lost. Errors: ResourceExhausted (WORKER_NOT_STARTED: no process or descriptor is left),
+  /// FailedPrecondition (WORKER_NOT_FOUND: the program cannot be executed).
   static absl::StatusOr<ChildProcess> Start(const ChildCommand& command);
 
   ChildProcess(ChildProcess&& other) noexcept;
@@ -91,6 +93,13 @@ class ChildProcess {
 
   /// Returns the memory of the process in RAM, bytes, or 0 once it has ended.
   uint64_t ResidentBytes() const;
+
+  /// Returns the processor time that all threads of the process have used, or 0 once it has ended.
+  std::chrono::nanoseconds ProcessorTime() const;
+
+  /// Returns whether every thread of the process waits for an event, and none for a processor or
+  /// the disk. A process whose threads cannot be read does not sleep.
+  bool Sleeps() const;
 
   /// Returns the end of the process, if it has ended. It then also kills the rest of a worker's
   /// group and reaps the process.

@@ -44,6 +44,30 @@ TEST(ChildProcess, TellsExitStatusAndSignal) {
   EXPECT_EQ(killed.status, SIGTERM);
 }
 
+TEST(ChildProcess, TellsTheEndAlsoIfItsParentWasStartedWithSigchldIgnored) {
+  std::signal(SIGCHLD, SIG_IGN);
+  const Printed printed = RunScript("sed -n 's/^SigIgn:\t//p' /proc/self/status; exit 7");
+  EXPECT_TRUE(printed.end.exited);
+  EXPECT_EQ(printed.end.status, 7);
+  EXPECT_EQ(printed.output, "0000000000000000\n") << "the child ignores no signal, either";
+}
+
+TEST(ChildProcess, TellsWhetherItComputesOrSleeps) {
+  Pipe output = *Pipe::Make();
+  auto child = ChildProcess::Start(
+      {.words = {"sh", "-c", "for i in $(seq 30000); do :; done; echo; kill -STOP $$; sleep 1000"},
+       .output = output.write_end()});
+  ASSERT_TRUE(child.ok()) << child.status();
+  EXPECT_FALSE(output.Read(1).empty());
+  while (!child->Sleeps()) {
+  }
+  EXPECT_GT(child->ProcessorTime(), std::chrono::milliseconds(1));
+  auto busy = ChildProcess::Start({.words = {"sh", "-c", "while :; do :; done"}});
+  const std::chrono::nanoseconds before = busy->ProcessorTime();
+  while (busy->ProcessorTime() < before + std::chrono::milliseconds(50))
+    EXPECT_FALSE(busy->Sleeps());
+}
+
 TEST(ChildProcess, AProgramThatCannotBeExecutedIsAnErrorOfTheStart) {
   const auto child = ChildProcess::Start({.words = {"/nowhere/carillon-precompute"}});
   EXPECT_TRUE(absl::IsFailedPrecondition(child.status()));
