@@ -19,7 +19,7 @@ enum class Verdict {
   kBadInput,  ///< the worker refused the request and would refuse it again
   kCrashed,   ///< the worker died, or broke the protocol of its events
   kOutOfMemory,
-  kStalled,  ///< the worker sent no event for too long
+  kStalled,  ///< the worker sent no event for too long, though it had the processor
   kTimeout,
   kCancelled,
 };

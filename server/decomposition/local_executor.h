@@ -22,7 +22,7 @@ struct LocalExecutorOptions {
   uint64_t memory_budget_bytes = 0;  ///< resident memory of all workers; 0 means half of RAM
   uint64_t memory_limit_bytes = 0;   ///< resident memory of one worker; 0 means the whole budget
   std::chrono::milliseconds time_limit = std::chrono::hours(6);
-  /// Longest time without an event.
+  /// Longest time without an event, while a worker computes or sleeps; see WorkerLimits.
   std::chrono::milliseconds stall_limit = std::chrono::seconds(60);
   std::filesystem::path kernel_counts = kKernelCounts;  ///< see OomKillCount
 };

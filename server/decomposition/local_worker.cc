@@ -33,6 +33,9 @@ constexpr size_t kLogBytes = 4 << 10;
 // Far above one event a second; a worker that writes more is faulty.
 constexpr uint64_t kFreeEventBytes = 1 << 20;
 constexpr uint64_t kEventBytesPerS = 64 << 10;
+// The longest time that counts as silence between two looks at a worker. Where a look comes later
+// than this, the daemon itself waited for a processor.
+constexpr nanoseconds kLongestLook = std::chrono::seconds(1);
 
 double Seconds(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
 
@@ -156,7 +159,8 @@ void LocalWorker::Read(nanoseconds now) {
 }
 
 void LocalWorker::OnEvent(const v1::WorkerEvent& event, nanoseconds now) {
-  last_event_ = now;
+  last_look_ = now;
+  silence_ = {};
   if (event.has_error()) {
     reported_ = event.error();
   } else {
@@ -174,7 +178,15 @@ void LocalWorker::OnProgress(v1::Progress progress) {
   task_.on_progress(progress);
 }
 
+void LocalWorker::CountSilence(nanoseconds now) {
+  const nanoseconds passed = std::min(now - std::exchange(last_look_, now), kLongestLook);
+  const nanoseconds before = std::exchange(processor_time_, process_.ProcessorTime());
+  silence_ +=
+      process_.Sleeps() ? passed : std::clamp(processor_time_ - before, nanoseconds(0), passed);
+}
+
 uint64_t LocalWorker::Enforce(nanoseconds now) {
+  CountSilence(now);
   resident_bytes_ = process_.ResidentBytes();
   peak_bytes_ = std::max(peak_bytes_, resident_bytes_);
   if (resident_bytes_ > limits_.memory_bytes) {
@@ -187,13 +199,14 @@ uint64_t LocalWorker::Enforce(nanoseconds now) {
                        absl::StrCat("the decomposition took more than its ", Seconds(limits_.time),
                                     " s: ask for fewer nodes or a lower maximal frequency, or "
                                     "give it more time")));
-  } else if (now - last_event_ > limits_.stall) {
-    Kill(Verdict::kStalled,
-         InternalError("WORKER_STALLED",
-                       absl::StrCat("the decomposing process gave no sign of life for ",
-                                    Seconds(limits_.stall),
-                                    " s: try again; if it stalls again, report it with "
-                                    "the mesh")));
+  } else if (silence_ > limits_.stall) {
+    Kill(
+        Verdict::kStalled,
+        InternalError(
+            "WORKER_STALLED",
+            absl::StrCat("the decomposing process gave no sign of life in ", Seconds(limits_.stall),
+                         " s in which it could have: try again; if it stalls again, report it with "
+                         "the mesh")));
   }
   return resident_bytes_;
 }

@@ -35,6 +35,8 @@ class ScratchFolder {
 struct WorkerLimits {
   uint64_t memory_bytes = 0;
   std::chrono::nanoseconds time{};
+  /// Without an event, of the time in which the worker computes or sleeps. The time in which it
+  /// waits for a processor or the disk does not count, because others take them on a busy machine.
   std::chrono::nanoseconds stall{};
 
   /// Returns these limits, with memory and time lowered to the request's limits if those are lower.
@@ -104,10 +106,11 @@ class LocalWorker {
         process_(std::move(process)),
         limits_(limits),
         started_(now),
-        last_event_(now) {}
+        last_look_(now) {}
 
   void OnEvent(const v1::WorkerEvent& event, std::chrono::nanoseconds now);
   void OnProgress(v1::Progress progress);
+  void CountSilence(std::chrono::nanoseconds now);
   void Kill(Verdict verdict, v1::ErrorInfo error);
   Outcome Judge(const ProcessEnd& end) const;
   Outcome JudgeFailure(const ProcessEnd& end) const;
@@ -125,7 +128,9 @@ class LocalWorker {
   uint64_t peak_bytes_ = 0;
   uint32_t node_count_ = 0;
   std::chrono::nanoseconds started_;
-  std::chrono::nanoseconds last_event_;
+  std::chrono::nanoseconds last_look_;         // of CountSilence, or the newest event
+  std::chrono::nanoseconds processor_time_{};  // of the process at the last CountSilence
+  std::chrono::nanoseconds silence_{};         // since the newest event; see WorkerLimits::stall
   WorkerEventReader events_;
   uint64_t event_byte_count_ = 0;
   std::string log_;  // the end of the process's standard error

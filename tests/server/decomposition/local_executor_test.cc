@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <limits>
@@ -289,6 +290,57 @@ TEST_F(LocalExecutorTest, KillsAWorkerWithoutSignsOfLifeAndItsChildren) {
   EXPECT_EQ(outcome.verdict, Verdict::kStalled);
   EXPECT_EQ(outcome.error.reason(), "WORKER_STALLED");
   EXPECT_TRUE(life.LosesItsWriters());
+}
+
+/// A clock that only a test moves, and that tells when it has been read.
+class MovedClock final : public Clock {
+ public:
+  std::chrono::nanoseconds Monotonic() const noexcept override {
+    ++read_count_;
+    read_count_.notify_all();
+    return std::chrono::nanoseconds(now_ns_);
+  }
+  int64_t UnixMs() const noexcept override { return 0; }
+
+  void Move(std::chrono::nanoseconds time) { now_ns_ += time.count(); }
+
+  /// Waits until others have read the clock this often.
+  void AwaitReads(int count) const {
+    const int last = read_count_ + count;
+    for (int seen = read_count_; seen < last; seen = read_count_) read_count_.wait(seen);
+  }
+
+ private:
+  std::atomic<int64_t> now_ns_{0};
+  mutable std::atomic<int> read_count_{0};
+};
+
+TEST_F(LocalExecutorTest, AWorkerThatWaitsForAProcessorIsNotStalled) {
+  WriteEvents(ProgressBytes(0.5));
+  MovedClock clock;
+  options_.program = WriteWorkerScript(
+      folder_.path(),
+      "cat \"$here/events\" >&3; until [ -e \"$here/go\" ]; do :; done; echo sound >\"$out\"");
+  options_.directory = folder_ / "running";
+  options_.stall_limit = std::chrono::minutes(10);
+  executor_ = *MakeLocalExecutor(options_, clock);
+  Start(run_);
+  ASSERT_TRUE(Happens(run_.progressed));
+  // The worker computes throughout, but an hour passes in which it gets no more than a second.
+  for (int hour_part = 0; hour_part < 4; ++hour_part) {
+    clock.Move(std::chrono::minutes(15));
+    clock.AwaitReads(4);
+  }
+  WriteBytes(folder_ / "go", "");
+  ASSERT_TRUE(Happens(run_.ended));
+  EXPECT_EQ(run_.outcome.verdict, Verdict::kOk) << run_.outcome.error.message();
+  EXPECT_EQ(run_.model, "sound\n");
+  executor_.reset();  // before its clock
+}
+
+TEST_F(LocalExecutorTest, AWorkerThatComputesWithoutAnEventIsStalled) {
+  options_.stall_limit = milliseconds(300);
+  EXPECT_EQ(RunScript("while :; do :; done").verdict, Verdict::kStalled);
 }
 
 TEST_F(LocalExecutorTest, KillsAWorkerThatLivesButNeverEnds) {
