@@ -7,6 +7,27 @@
 #include "server/decomposition/job_rules.h"
 
 namespace carillon {
+namespace {
+
+// A job as clients see it. `wait` is what it waits for if it is in the queue.
+v1::Job Shown(const ActiveJob& job, const v1::JobWait& wait) {
+  const bool runs = job.running.has_value();
+  v1::Job view = ToJob(job.record);
+  view.set_state(runs ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
+  view.set_memory_bytes(std::max(job.record.peak_bytes, job.estimate_bytes));
+  view.set_coarse_ready(job.coarse_ready);
+  if (runs) {
+    *view.mutable_progress() = job.progress;
+    view.set_started_unix_ms(job.started_unix_ms);
+  } else if (!job.waits_for.empty()) {
+    view.mutable_wait()->set_cause(v1::WAIT_CAUSE_COARSE_MODEL);
+  } else if (wait.cause() != v1::WAIT_CAUSE_UNSPECIFIED) {
+    *view.mutable_wait() = wait;
+  }
+  return view;
+}
+
+}  // namespace
 
 void ActiveJobs::SetCapacity(const JobCapacity& capacity) {
   MutexLock lock(&mutex_);
@@ -79,12 +100,8 @@ std::optional<v1::Job> ActiveJobs::View(const std::string& digest) {
 std::map<std::string, v1::Job> ActiveJobs::ViewAll() {
   MutexLock lock(&mutex_);
   std::map<std::string, v1::Job> views;
-  for (const auto& [job, earlier_count] : WaitingJobs()) {
-    views.emplace(job->record.digest, ViewOf(*job, earlier_count));
-  }
-  for (const auto& [digest, job] : jobs_) {
-    if (!views.contains(digest)) views.emplace(digest, ViewOf(job, 0));
-  }
+  ForEachView(
+      [&](const ActiveJob& job, const v1::Job& view) { views.emplace(job.record.digest, view); });
   return views;
 }
 
@@ -175,11 +192,11 @@ std::vector<Notice> ActiveJobs::NewsOfWaiting() {
   MutexLock lock(&mutex_);
   std::vector<Notice> news;
   if (watchers_.empty()) return news;
-  for (const auto& [job, earlier_count] : WaitingJobs()) {
-    const auto watchers = watchers_.find(job->record.digest);
-    if (watchers == watchers_.end()) continue;
-    news.push_back({watchers->second, ViewOf(*job, earlier_count), ++version_});
-  }
+  ForEachWaiting([&](const ActiveJob& job, const v1::JobWait& wait) ABSL_NO_THREAD_SAFETY_ANALYSIS {
+    const auto watchers = watchers_.find(job.record.digest);
+    if (watchers == watchers_.end()) return;
+    news.push_back({watchers->second, Shown(job, wait), ++version_});
+  });
   return news;
 }
 
@@ -217,7 +234,7 @@ void ActiveJobs::Forget(const std::string& digest, const std::shared_ptr<Watcher
 
 void ActiveJobs::WatchAll(JobSink& sink) {
   MutexLock lock(&mutex_);
-  for (const auto& [digest, job] : jobs_) sink.Take(ViewOf(job));
+  ForEachView([&sink](const ActiveJob&, const v1::Job& view) { sink.Take(view); });
   sink.TakeBegin();
   sinks_.insert(&sink);
 }
@@ -250,13 +267,14 @@ FairQueue::Entry ActiveJobs::EntryOf(const ActiveJob& job) {
           .digest = job.record.digest};
 }
 
-FairQueue& ActiveJobs::QueueOf(const ActiveJob& job) {
-  return job.record.transfer_of.empty() ? decompositions_ : transfers_;
+FairQueue& ActiveJobs::QueueOf(v1::JobKind kind) {
+  return kind == v1::JOB_KIND_DECOMPOSITION ? decompositions_ : transfers_;
 }
 
-// The number of jobs of the queue that start before a job.
+FairQueue& ActiveJobs::QueueOf(const ActiveJob& job) { return QueueOf(KindOf(job.record)); }
+
+// The number of jobs of the queue that start before a job, which is in the queue.
 size_t ActiveJobs::EarlierCount(const ActiveJob& job) {
-  if (job.running.has_value() || !job.waits_for.empty()) return 0;
   const std::vector<absl::string_view> order = QueueOf(job).Order();
   return static_cast<size_t>(std::ranges::find(order, job.record.digest) - order.begin());
 }
@@ -273,45 +291,43 @@ v1::WaitCause ActiveJobs::WaitCauseOf(v1::JobKind kind) {
   return places_.Obstacle(kind, jobs_.at(*next).estimate_bytes);
 }
 
-std::optional<v1::JobWait> ActiveJobs::WaitOf(const ActiveJob& job, size_t earlier_count) {
-  if (job.running.has_value()) return std::nullopt;
+// What the waiting jobs of a kind wait for. Their places in the queue are added for each job.
+v1::JobWait ActiveJobs::WaitOf(v1::JobKind kind) {
   v1::JobWait wait;
-  if (!job.waits_for.empty()) {
-    wait.set_cause(v1::WAIT_CAUSE_COARSE_MODEL);
-    return wait;
-  }
-  const v1::JobKind kind = KindOf(job.record);
   wait.set_cause(WaitCauseOf(kind));
-  if (wait.cause() == v1::WAIT_CAUSE_UNSPECIFIED) return std::nullopt;  // it starts now
-  wait.set_earlier_job_count(static_cast<uint32_t>(earlier_count));
+  if (wait.cause() == v1::WAIT_CAUSE_UNSPECIFIED) return wait;  // the first of them starts now
   const std::vector<std::string> occupants = places_.Occupants(kind, wait.cause());
   wait.set_running_job_count(static_cast<uint32_t>(occupants.size()));
   if (occupants.size() == 1) wait.set_running_job_label(jobs_.at(occupants[0]).record.label);
   return wait;
 }
 
-v1::Job ActiveJobs::ViewOf(const ActiveJob& job) { return ViewOf(job, EarlierCount(job)); }
-
-v1::Job ActiveJobs::ViewOf(const ActiveJob& job, size_t earlier_count) {
-  v1::Job view = ToJob(job.record);
-  view.set_state(job.running.has_value() ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
-  view.set_memory_bytes(std::max(job.record.peak_bytes, job.estimate_bytes));
-  view.set_coarse_ready(job.coarse_ready);
-  if (job.running.has_value()) *view.mutable_progress() = job.progress;
-  if (job.running.has_value()) view.set_started_unix_ms(job.started_unix_ms);
-  if (auto wait = WaitOf(job, earlier_count)) *view.mutable_wait() = *std::move(wait);
-  return view;
+v1::Job ActiveJobs::ViewOf(const ActiveJob& job) {
+  if (job.running.has_value() || !job.waits_for.empty()) return Shown(job, {});
+  v1::JobWait wait = WaitOf(KindOf(job.record));
+  wait.set_earlier_job_count(static_cast<uint32_t>(EarlierCount(job)));
+  return Shown(job, wait);
 }
 
-std::vector<ActiveJobs::Waiting> ActiveJobs::WaitingJobs() {
-  std::vector<Waiting> waiting;
-  for (const FairQueue* queue : {&decompositions_, &transfers_}) {
-    size_t earlier_count = 0;
-    for (const absl::string_view digest : queue->Order()) {
-      waiting.push_back({&jobs_.at(std::string(digest)), earlier_count++});
+void ActiveJobs::ForEachWaiting(
+    absl::FunctionRef<void(const ActiveJob&, const v1::JobWait&)> visit) {
+  for (const v1::JobKind kind : {v1::JOB_KIND_DECOMPOSITION, v1::JOB_KIND_TRANSFER}) {
+    v1::JobWait wait = WaitOf(kind);
+    uint32_t earlier_count = 0;
+    for (const absl::string_view digest : QueueOf(kind).Order()) {
+      wait.set_earlier_job_count(earlier_count++);
+      visit(jobs_.at(std::string(digest)), wait);
     }
   }
-  return waiting;
+}
+
+// In time linear in the number of jobs, for whoever wants to see all of them.
+void ActiveJobs::ForEachView(absl::FunctionRef<void(const ActiveJob&, const v1::Job&)> visit) {
+  for (const auto& [digest, job] : jobs_) {
+    if (job.running.has_value() || !job.waits_for.empty()) visit(job, Shown(job, {}));
+  }
+  ForEachWaiting(
+      [&](const ActiveJob& job, const v1::JobWait& wait) { visit(job, Shown(job, wait)); });
 }
 
 Notice ActiveJobs::Announce(const ActiveJob& job) {

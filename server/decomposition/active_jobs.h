@@ -138,20 +138,17 @@ class ActiveJobs {
   double Learn(uint64_t guess_bytes, uint64_t peak_bytes);
 
  private:
-  struct Waiting {
-    const ActiveJob* job;
-    size_t earlier_count;
-  };
-
   static FairQueue::Entry EntryOf(const ActiveJob& job);
+  FairQueue& QueueOf(v1::JobKind kind) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   FairQueue& QueueOf(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   size_t EarlierCount(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   v1::WaitCause WaitCauseOf(v1::JobKind kind) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  std::optional<v1::JobWait> WaitOf(const ActiveJob& job, size_t earlier_count)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  v1::JobWait WaitOf(v1::JobKind kind) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   v1::Job ViewOf(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  v1::Job ViewOf(const ActiveJob& job, size_t earlier_count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  std::vector<Waiting> WaitingJobs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ForEachWaiting(absl::FunctionRef<void(const ActiveJob&, const v1::JobWait&)> visit)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ForEachView(absl::FunctionRef<void(const ActiveJob&, const v1::Job&)> visit)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void TellSinks(const v1::Job& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Notice Announce(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Enqueue(ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "absl/strings/str_cat.h"
+
 namespace carillon {
 namespace {
 
@@ -123,6 +125,39 @@ TEST_F(ActiveJobsTest, TellsWhatAJobWaitsFor) {
   EXPECT_EQ(jobs_.ViewAll().at("c").wait().earlier_job_count(), 1U);
   jobs_.Add({.record = {.digest = "fine"}, .request = {}, .waits_for = "a"});
   EXPECT_EQ(WaitOf("fine").cause(), v1::WAIT_CAUSE_COARSE_MODEL);
+}
+
+/// Keeps the places in the queue of the jobs that it is given.
+class PlaceSink final : public JobSink {
+ public:
+  void Take(const v1::Job& job) override { places[job.name()] = job.wait().earlier_job_count(); }
+  void TakeBegin() override { ++begin_count; }
+
+  std::map<std::string, uint32_t> places;
+  int begin_count = 0;
+};
+
+TEST_F(ActiveJobsTest, ASinkGetsManyWaitingJobsInTimeLinearInTheirNumber) {
+  jobs_.SetCapacity({.worker_count = 1, .memory_budget_bytes = 100});
+  constexpr uint32_t kJobCount = 20'000;
+  AddModel("first");
+  Start();
+  for (uint32_t i = 0; i < kJobCount; ++i) AddModel(absl::StrCat("waits", i));
+  const auto time_of = [this](auto call) {
+    const auto begin = clock_.Monotonic();
+    call();
+    return clock_.Monotonic() - begin;
+  };
+  PlaceSink sink;
+  const auto listed = time_of([this] { EXPECT_EQ(jobs_.ViewAll().size(), kJobCount + 1); });
+  const auto taken = time_of([&] { jobs_.WatchAll(sink); });
+  jobs_.Forget(sink);
+  EXPECT_EQ(sink.begin_count, 1);
+  EXPECT_EQ(sink.places.size(), kJobCount + 1);
+  EXPECT_EQ(sink.places.at("jobs/waits0"), 0U);
+  EXPECT_EQ(sink.places.at(absl::StrCat("jobs/waits", kJobCount - 1)), kJobCount - 1);
+  // Both calls show every job once. An order of the queue for each job took 300 times as long.
+  EXPECT_LT(taken, 20 * listed);
 }
 
 TEST_F(ActiveJobsTest, TellsThoseThatWatchWaitingJobsOfTheirPlaceInTheQueue) {
