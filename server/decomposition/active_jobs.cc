@@ -11,7 +11,7 @@ namespace {
 
 // A job as clients see it. `wait` is what it waits for if it is in the queue.
 v1::Job Shown(const ActiveJob& job, const v1::JobWait& wait) {
-  const bool runs = job.running.has_value();
+  const bool runs = job.runs();
   v1::Job view = ToJob(job.record);
   view.set_state(runs ? v1::JOB_STATE_RUNNING : v1::JOB_STATE_QUEUED);
   view.set_memory_bytes(std::max(job.record.peak_bytes, job.estimate_bytes));
@@ -19,7 +19,7 @@ v1::Job Shown(const ActiveJob& job, const v1::JobWait& wait) {
   if (runs) {
     *view.mutable_progress() = job.progress;
     view.set_started_unix_ms(job.started_unix_ms);
-  } else if (!job.waits_for.empty()) {
+  } else if (job.stage == JobStage::kAwaitsCoarse) {
     view.mutable_wait()->set_cause(v1::WAIT_CAUSE_COARSE_MODEL);
   } else if (wait.cause() != v1::WAIT_CAUSE_UNSPECIFIED) {
     *view.mutable_wait() = wait;
@@ -29,8 +29,8 @@ v1::Job Shown(const ActiveJob& job, const v1::JobWait& wait) {
 
 }  // namespace
 
-void ActiveJobs::SetCapacity(const JobCapacity& capacity) {
-  MutexLock lock(&mutex_);
+ActiveJobs::ActiveJobs(const JobCapacity& capacity, const MemoryExperience& experience)
+    : experience_(experience) {
   places_.SetCapacity(capacity);
 }
 
@@ -46,48 +46,23 @@ bool ActiveJobs::Contains(const std::string& digest) {
   return jobs_.contains(digest);
 }
 
-size_t ActiveJobs::queued_count() {
+std::vector<ActiveJob> ActiveJobs::Select(absl::FunctionRef<bool(const ActiveJob&)> wanted) {
   MutexLock lock(&mutex_);
-  return decompositions_.size() + transfers_.size();
+  std::vector<ActiveJob> selected;
+  for (const auto& [digest, job] : jobs_) {
+    if (wanted(job)) selected.push_back(job);
+  }
+  return selected;
 }
 
-size_t ActiveJobs::queued_count(const std::string& client) {
-  MutexLock lock(&mutex_);
-  return decompositions_.size(client) + transfers_.size(client);
-}
-
-ActiveJobs::Counts ActiveJobs::CountStates() {
+ActiveJobs::Counts ActiveJobs::Count(const std::string& client) {
   MutexLock lock(&mutex_);
   const auto running = static_cast<size_t>(
-      std::ranges::count_if(jobs_, [](const auto& job) { return job.second.running.has_value(); }));
-  return {.queued = jobs_.size() - running, .running = running};
-}
-
-std::vector<ActiveJob> ActiveJobs::Running() {
-  MutexLock lock(&mutex_);
-  std::vector<ActiveJob> running;
-  for (const auto& [digest, job] : jobs_) {
-    if (job.running.has_value()) running.push_back(job);
-  }
-  return running;
-}
-
-std::vector<std::string> ActiveJobs::TransfersOf(const std::string& model) {
-  MutexLock lock(&mutex_);
-  std::vector<std::string> digests;
-  for (const auto& [digest, job] : jobs_) {
-    if (job.record.transfer_of == model) digests.push_back(digest);
-  }
-  return digests;
-}
-
-std::vector<std::string> ActiveJobs::WaitingFor(const std::string& coarse) {
-  MutexLock lock(&mutex_);
-  std::vector<std::string> digests;
-  for (const auto& [digest, job] : jobs_) {
-    if (job.waits_for == coarse) digests.push_back(digest);
-  }
-  return digests;
+      std::ranges::count_if(jobs_, [](const auto& job) { return job.second.runs(); }));
+  return {.queued = jobs_.size() - running,
+          .running = running,
+          .in_queue = decompositions_.size() + transfers_.size(),
+          .in_queue_of_client = decompositions_.size(client) + transfers_.size(client)};
 }
 
 std::optional<v1::Job> ActiveJobs::View(const std::string& digest) {
@@ -111,34 +86,28 @@ void ActiveJobs::Add(ActiveJob job) {
       job.record.transfer_of.empty() ? experience_.Corrected(job.guess_bytes) : job.guess_bytes;
   if (job.record.peak_bytes > 0) job.estimate_bytes = job.record.peak_bytes;
   const std::string digest = job.record.digest;
-  ActiveJob& added = jobs_.emplace(digest, std::move(job)).first->second;
-  Enqueue(added);
-  if (!sinks_.empty()) TellSinks(ViewOf(added));
+  job.stage = job.waits_for.empty() ? JobStage::kWaits : JobStage::kAwaitsCoarse;
+  job.number = ++last_number_;
+  const ActiveJob& added = jobs_.emplace(digest, std::move(job)).first->second;
+  if (added.stage == JobStage::kWaits) QueueOf(added).Add(EntryOf(added));
+  if (watchers_.has_sinks()) watchers_.TellSinks(ViewOf(added));
 }
 
-Notice ActiveJobs::Change(const std::string& digest, absl::FunctionRef<void(ActiveJob&)> change) {
+Notice ActiveJobs::Apply(const std::string& digest, const JobEvent& event) {
   MutexLock lock(&mutex_);
-  ActiveJob& job = jobs_.at(digest);
+  const auto found = jobs_.find(digest);
+  ActiveJob& job = found->second;
   QueueOf(job).Remove(EntryOf(job));
-  change(job);
-  if (!job.running.has_value() && job.waits_for.empty()) QueueOf(job).Add(EntryOf(job));
-  return Announce(job);
-}
-
-void ActiveJobs::AddWish(const std::string& digest, const std::string& client) {
-  MutexLock lock(&mutex_);
-  if (const auto job = jobs_.find(digest); job != jobs_.end()) job->second.wishes.Add(client);
-}
-
-Notice ActiveJobs::Remove(const std::string& digest, const v1::Job& last) {
-  MutexLock lock(&mutex_);
-  const auto job = jobs_.find(digest);
-  QueueOf(job->second).Remove(EntryOf(job->second));
-  jobs_.erase(job);
-  TellSinks(last);
-  Notice notice{{}, last, ++version_};
-  if (auto watchers = watchers_.extract(digest)) notice.watchers = std::move(watchers.mapped());
-  return notice;
+  JobStep step = Transition(std::move(job), event);
+  job = std::move(step.job);
+  if (step.action == JobAction::kEnd) {
+    const v1::Job last = ToJob(job.record);
+    jobs_.erase(found);
+    return watchers_.AnnounceEnd(digest, last);
+  }
+  if (step.action == JobAction::kWaitAgain) job.number = ++last_number_;
+  if (job.stage == JobStage::kWaits) QueueOf(job).Add(EntryOf(job));
+  return watchers_.Announce(digest, ViewOf(job));
 }
 
 std::optional<ActiveJob> ActiveJobs::BeginRun(const Clock& clock) {
@@ -151,7 +120,8 @@ std::optional<ActiveJob> ActiveJobs::BeginRun(const Clock& clock) {
     queue->Remove(EntryOf(job));
     queue->NoteStart(job.client);
     places_.Take(*next, KindOf(job.record), job.estimate_bytes);
-    job.running = job.request;
+    job.stage = JobStage::kRuns;
+    job.given = job.request;
     job.started = clock.Monotonic();
     job.started_unix_ms = clock.UnixMs();
     job.progress.Clear();
@@ -161,12 +131,21 @@ std::optional<ActiveJob> ActiveJobs::BeginRun(const Clock& clock) {
   return std::nullopt;
 }
 
+Notice ActiveJobs::AnnounceRun(const std::string& digest) {
+  MutexLock lock(&mutex_);
+  return watchers_.Announce(digest, ViewOf(jobs_.at(digest)));
+}
+
 std::vector<std::string> ActiveJobs::BeginYielding() {
   MutexLock lock(&mutex_);
   if (WaitCauseOf(v1::JOB_KIND_DECOMPOSITION) != v1::WAIT_CAUSE_MEMORY) return {};
   const uint64_t bytes = jobs_.at(*decompositions_.Next()).estimate_bytes;
   std::vector<std::string> digests = places_.ChooseToEnd(bytes);
-  for (const std::string& digest : digests) jobs_.at(digest).yields = true;
+  for (const std::string& digest : digests) {
+    // A run that is to end anyway goes on to its own end.
+    JobStage& stage = jobs_.at(digest).stage;
+    if (stage == JobStage::kRuns) stage = JobStage::kYields;
+  }
   return digests;
 }
 
@@ -179,85 +158,73 @@ Notice ActiveJobs::Report(const std::string& digest, const v1::Progress& progres
     places_.Resize(digest, job.estimate_bytes);
   }
   job.progress = progress;
-  return Announce(job);
+  return watchers_.Announce(digest, ViewOf(job));
 }
 
-ActiveJob ActiveJobs::EndRun(const std::string& digest) {
+ActiveJob ActiveJobs::EndRun(const std::string& digest, uint64_t peak_bytes) {
   MutexLock lock(&mutex_);
   places_.Free(digest);
-  return jobs_.at(digest);
+  const ActiveJob& job = jobs_.at(digest);
+  if (job.record.transfer_of.empty() && peak_bytes > 0) {
+    experience_.Learn(job.guess_bytes, peak_bytes);
+  }
+  return job;
 }
 
 std::vector<Notice> ActiveJobs::NewsOfWaiting() {
   MutexLock lock(&mutex_);
   std::vector<Notice> news;
-  if (watchers_.empty()) return news;
+  if (!watchers_.has_watchers()) return news;
   ForEachWaiting([&](const ActiveJob& job, const v1::JobWait& wait) ABSL_NO_THREAD_SAFETY_ANALYSIS {
-    const auto watchers = watchers_.find(job.record.digest);
-    if (watchers == watchers_.end()) return;
-    news.push_back({watchers->second, Shown(job, wait), ++version_});
+    if (!watchers_.HasWatchers(job.record.digest)) return;
+    news.push_back(watchers_.For(job.record.digest, Shown(job, wait)));
   });
   return news;
 }
 
-Notice ActiveJobs::QueueAgain(ActiveJob job) {
+MemoryExperience ActiveJobs::experience() {
   MutexLock lock(&mutex_);
-  job.running.reset();
-  ActiveJob& queued = jobs_.at(job.record.digest);
-  queued = std::move(job);
-  Enqueue(queued);
-  return Announce(queued);
+  return experience_;
 }
 
 Notice ActiveJobs::Watch(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
   MutexLock lock(&mutex_);
-  watchers_[digest].push_back(watcher);
+  watchers_.Add(digest, watcher);
   const auto job = jobs_.find(digest);
-  return {{watcher}, job == jobs_.end() ? v1::Job() : ViewOf(job->second), ++version_};
+  return watchers_.For(watcher, job == jobs_.end() ? v1::Job() : ViewOf(job->second));
 }
 
 Notice ActiveJobs::CompleteWatch(const std::string& digest, Notice watch, const v1::Job& stored) {
   MutexLock lock(&mutex_);
   if (const auto job = jobs_.find(digest); job != jobs_.end()) {
-    return {std::move(watch.watchers), ViewOf(job->second), ++version_};
+    return watchers_.For(watch.watchers.front(), ViewOf(job->second));
   }
   // The notice keeps the version of the registration: any change announced since is newer.
   watch.job = stored;
-  if (HasEnded(stored.state())) EraseWatcher(digest, watch.watchers.front());
+  if (HasEnded(stored.state())) watchers_.Erase(digest, watch.watchers.front());
   return watch;
 }
 
 void ActiveJobs::Forget(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
   MutexLock lock(&mutex_);
-  EraseWatcher(digest, watcher);
+  watchers_.Erase(digest, watcher);
 }
 
 void ActiveJobs::WatchAll(JobSink& sink) {
   MutexLock lock(&mutex_);
   ForEachView([&sink](const ActiveJob&, const v1::Job& view) { sink.Take(view); });
   sink.TakeBegin();
-  sinks_.insert(&sink);
+  watchers_.Add(sink);
 }
 
 void ActiveJobs::Forget(JobSink& sink) {
   MutexLock lock(&mutex_);
-  sinks_.erase(&sink);
+  watchers_.Erase(sink);
 }
 
 void ActiveJobs::TellEnded(const v1::Job& job) {
   MutexLock lock(&mutex_);
-  TellSinks(job);
-}
-
-void ActiveJobs::SetExperience(const MemoryExperience& experience) {
-  MutexLock lock(&mutex_);
-  experience_ = experience;
-}
-
-double ActiveJobs::Learn(uint64_t guess_bytes, uint64_t peak_bytes) {
-  MutexLock lock(&mutex_);
-  experience_.Learn(guess_bytes, peak_bytes);
-  return experience_.correction();
+  watchers_.TellSinks(job);
 }
 
 FairQueue::Entry ActiveJobs::EntryOf(const ActiveJob& job) {
@@ -272,12 +239,6 @@ FairQueue& ActiveJobs::QueueOf(v1::JobKind kind) {
 }
 
 FairQueue& ActiveJobs::QueueOf(const ActiveJob& job) { return QueueOf(KindOf(job.record)); }
-
-// The number of jobs of the queue that start before a job, which is in the queue.
-size_t ActiveJobs::EarlierCount(const ActiveJob& job) {
-  const std::vector<absl::string_view> order = QueueOf(job).Order();
-  return static_cast<size_t>(std::ranges::find(order, job.record.digest) - order.begin());
-}
 
 // Why the first waiting job of a kind cannot start.
 v1::WaitCause ActiveJobs::WaitCauseOf(v1::JobKind kind) {
@@ -303,9 +264,11 @@ v1::JobWait ActiveJobs::WaitOf(v1::JobKind kind) {
 }
 
 v1::Job ActiveJobs::ViewOf(const ActiveJob& job) {
-  if (job.running.has_value() || !job.waits_for.empty()) return Shown(job, {});
+  if (job.stage != JobStage::kWaits) return Shown(job, {});
   v1::JobWait wait = WaitOf(KindOf(job.record));
-  wait.set_earlier_job_count(static_cast<uint32_t>(EarlierCount(job)));
+  const std::vector<absl::string_view> order = QueueOf(job).Order();
+  const auto place = std::ranges::find(order, job.record.digest) - order.begin();
+  wait.set_earlier_job_count(static_cast<uint32_t>(place));
   return Shown(job, wait);
 }
 
@@ -324,34 +287,10 @@ void ActiveJobs::ForEachWaiting(
 // In time linear in the number of jobs, for whoever wants to see all of them.
 void ActiveJobs::ForEachView(absl::FunctionRef<void(const ActiveJob&, const v1::Job&)> visit) {
   for (const auto& [digest, job] : jobs_) {
-    if (job.running.has_value() || !job.waits_for.empty()) visit(job, Shown(job, {}));
+    if (job.stage != JobStage::kWaits) visit(job, Shown(job, {}));
   }
   ForEachWaiting(
       [&](const ActiveJob& job, const v1::JobWait& wait) { visit(job, Shown(job, wait)); });
-}
-
-Notice ActiveJobs::Announce(const ActiveJob& job) {
-  const auto watchers = watchers_.find(job.record.digest);
-  Notice notice{{}, ViewOf(job), ++version_};
-  if (watchers != watchers_.end()) notice.watchers = watchers->second;
-  TellSinks(notice.job);
-  return notice;
-}
-
-void ActiveJobs::TellSinks(const v1::Job& job) {
-  for (JobSink* sink : sinks_) sink->Take(job);
-}
-
-void ActiveJobs::Enqueue(ActiveJob& job) {
-  job.number = ++last_number_;
-  if (job.waits_for.empty()) QueueOf(job).Add(EntryOf(job));
-}
-
-void ActiveJobs::EraseWatcher(const std::string& digest, const std::shared_ptr<Watcher>& watcher) {
-  const auto watchers = watchers_.find(digest);
-  if (watchers == watchers_.end()) return;
-  std::erase(watchers->second, watcher);
-  if (watchers->second.empty()) watchers_.erase(watchers);
 }
 
 }  // namespace carillon

@@ -1,46 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
-#include "server/base/event.h"
+#include "server/decomposition/active_jobs.h"
 #include "server/decomposition/executor.h"
+#include "server/decomposition/job_events.h"
+#include "server/decomposition/job_journal.h"
+#include "server/decomposition/job_runs.h"
 #include "server/decomposition/job_sink.h"
-#include "server/decomposition/phase_usage.h"
+#include "server/decomposition/job_watch.h"
+#include "server/decomposition/queue_settings.h"
+#include "server/decomposition/wanted_job.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {
-
-class QueueCore;
-
-/// Ends a watch when it is destroyed. After that, the watch's function is neither running nor
-/// called again. The function itself may destroy the JobWatch. The caller must hold no lock that
-/// the function takes.
-class JobWatch {
- public:
-  virtual ~JobWatch() = default;
-};
-
-struct QueueSettings {
-  size_t max_queued_count = 1024;
-  size_t max_queued_count_of_client = 512;
-  /// Whether a transfer is computed after each model whose request does not exclude it.
-  bool transfers = false;
-  /// Takes log lines about events that no call reports. Any thread may call it.
-  std::function<void(const std::string& line)> log = [](const std::string&) {};
-  /// Takes the failures and results of jobs, within limits (JobEvents).
-  EventSink log_event = [](const Event&) {};
-};
 
 struct DecompositionJobPage {
   std::vector<v1::Job> jobs;
@@ -50,6 +34,12 @@ struct DecompositionJobPage {
 /// Jobs that compute modal models and their transfers. Each job is computed once, however many
 /// requests ask for it. The next daemon computes the accepted jobs of a daemon that died. Get, List
 /// and Watch do not wait while the database writes. Safe from every thread.
+///
+/// A job that waits or runs is in `jobs_` and in the database; a job that has ended is in the
+/// database only. What becomes of a job is decided by Transition (job_machine.h), which asks no
+/// disk. Calls that change jobs hold the writer's lock of `runs_`; they store a change by
+/// `journal_` before they show it in `jobs_`. Get, List, Watch and Forget lock only `jobs_`, whose
+/// lock is never held during an access to the disk.
 class DecompositionQueue {
  public:
   /// Queues the unfinished jobs of an earlier run of the daemon. `database` and `clock` must
@@ -60,7 +50,7 @@ class DecompositionQueue {
       QueueSettings settings = {});
   ~DecompositionQueue();
 
-  const QueueSettings& settings() const;
+  const QueueSettings& settings() const { return settings_; }
 
   /// Returns whether a material may become the material of the objects that name none.
   using MaterialCheck = std::function<bool(const std::string& model, const v1::Material& material)>;
@@ -89,15 +79,7 @@ class DecompositionQueue {
                                          const std::string& client = {},
                                          bool may_change_pinned = true);
 
-  /// The numbers of jobs that wait, that run, and that have ended since the queue was made.
-  struct Counts {
-    size_t queued = 0;
-    size_t running = 0;
-    uint64_t succeeded = 0;
-    uint64_t failed = 0;
-    uint64_t cancelled = 0;
-    PhaseUses phases{};
-  };
+  using Counts = QueueCounts;
   Counts counts();
 
   /// Returns a job. Errors: NotFound (JOB_NOT_FOUND).
@@ -133,9 +115,46 @@ class DecompositionQueue {
   absl::Status DeleteModel(const std::string& digest);
 
  private:
-  explicit DecompositionQueue(std::shared_ptr<QueueCore> core);
+  using Notices = JobRuns::Notices;
 
-  std::shared_ptr<QueueCore> core_;
+  DecompositionQueue(ModeDatabase& database, std::unique_ptr<Executor> executor, const Clock& clock,
+                     QueueSettings settings);
+
+  absl::Status TakeUp();
+  absl::Status TakeUpJob(JobRecord record, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> SubmitAndTell(const WantedJob& wanted)
+      ABSL_LOCKS_EXCLUDED(runs_.writer());
+  absl::StatusOr<v1::Job> SubmitAny(const WantedJob& wanted, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> SubmitNew(const WantedJob& wanted, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> SubmitAgain(const ActiveJob& active, const WantedJob& wanted)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void FollowByTransfer(const WantedJob& model, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::Status CheckAcceptable(const WantedJob& wanted)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  std::optional<v1::CreateModalModelRequest> CoarseOf(const WantedJob& fine);
+  void CopyStoredCoarseModel(const WantedJob& fine) ABSL_LOCKS_EXCLUDED(runs_.writer());
+  std::string StartCoarse(const WantedJob& fine, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::Status AddWish(const std::string& digest, const std::string& client)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void OnQuarantine(const std::string& digest, const absl::Status& why);
+  bool ComputeAgain(const std::string& digest, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  void Drop(const std::string& digest, Notices& notices)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(runs_.writer());
+  absl::StatusOr<v1::Job> FindStored(const std::string& digest);
+
+  ModeDatabase& database_;
+  const Clock& clock_;
+  const QueueSettings settings_;
+  JobEvents events_;
+  JobJournal journal_;
+  const std::shared_ptr<ActiveJobs> jobs_;  ///< watches, which may outlive the queue, know it, too
+  JobRuns runs_;
 };
 
 }  // namespace carillon

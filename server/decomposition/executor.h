@@ -26,9 +26,9 @@ enum class Verdict {
 
 struct Outcome {
   Verdict verdict = Verdict::kCrashed;
-  v1::ErrorInfo error;               ///< empty if kOk
-  std::filesystem::path model_file;  ///< the stored form if kOk; exists until on_end returns
-  uint64_t peak_bytes = 0;           ///< highest observed memory; 0 if unknown
+  v1::ErrorInfo error{};               ///< empty if kOk
+  std::filesystem::path model_file{};  ///< the stored form if kOk; exists until on_end returns
+  uint64_t peak_bytes = 0;             ///< highest observed memory; 0 if unknown
   /// Set with kOutOfMemory if the worker kept to its own limit, but all workers together exceeded
   /// the budget. The task may succeed if it runs alone.
   bool crowded = false;

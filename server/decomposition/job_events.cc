@@ -41,4 +41,13 @@ void JobEvents::LogDeletedResult(const std::string& digest) {
             .With("cause", "deleted_while_stored"));
 }
 
+void JobEvents::LogUnstored(const std::string& what, const std::string& digest,
+                            const absl::Status& status) {
+  if (status.ok()) return;
+  unstored_.Log(Event("job_not_stored", LogLevel::kWarning)
+                    .With("what", what)
+                    .WithSome("job", digest.empty() ? "" : absl::StrCat("jobs/", digest))
+                    .With("message", status.message()));
+}
+
 }  // namespace carillon

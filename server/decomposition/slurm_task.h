@@ -10,7 +10,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/remote_runs.h"
-#include "server/decomposition/slurm_executor.h"
+#include "server/decomposition/slurm_options.h"
 #include "server/decomposition/slurm_queue.h"
 
 namespace carillon {

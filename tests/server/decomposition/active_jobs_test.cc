@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "absl/strings/str_cat.h"
 
 namespace carillon {
@@ -17,37 +19,39 @@ using ::testing::IsEmpty;
 class ActiveJobsTest : public ::testing::Test {
  protected:
   void AddModel(const std::string& digest, uint64_t bytes = 1) {
-    jobs_.Add({.record = {.digest = digest, .label = "the " + digest},
-               .request = {},
-               .guess_bytes = bytes});
+    jobs_->Add({.record = {.digest = digest, .label = "the " + digest},
+                .request = {},
+                .guess_bytes = bytes});
   }
 
   void AddTransfer(const std::string& digest, uint64_t bytes = 1) {
-    jobs_.Add({.record = {.digest = digest, .transfer_of = "model", .label = "the " + digest},
-               .request = {},
-               .guess_bytes = bytes});
+    jobs_->Add({.record = {.digest = digest, .transfer_of = "model", .label = "the " + digest},
+                .request = {},
+                .guess_bytes = bytes});
   }
 
   /// Starts the jobs that can start, and returns their digests.
   std::vector<std::string> Start() {
     std::vector<std::string> started;
-    while (const auto job = jobs_.BeginRun(clock_)) started.push_back(job->record.digest);
+    while (const auto job = jobs_->BeginRun(clock_)) started.push_back(job->record.digest);
     return started;
   }
 
   void End(const std::string& digest) {
-    jobs_.EndRun(digest);
-    jobs_.Remove(digest, {});
+    jobs_->EndRun(digest);
+    jobs_->Apply(digest, RunEnded{{.verdict = Verdict::kOk}});
   }
 
-  v1::JobWait WaitOf(const std::string& digest) { return jobs_.View(digest)->wait(); }
+  v1::JobWait WaitOf(const std::string& digest) { return jobs_->View(digest)->wait(); }
+
+  void MakeJobs(const JobCapacity& capacity) { jobs_ = std::make_unique<ActiveJobs>(capacity); }
 
   SystemClock clock_;
-  ActiveJobs jobs_;
+  std::unique_ptr<ActiveJobs> jobs_;
 };
 
 TEST_F(ActiveJobsTest, DecompositionsStartBeforeTransfersThatWaitedLonger) {
-  jobs_.SetCapacity({.worker_count = 1, .memory_budget_bytes = 100});
+  MakeJobs({.worker_count = 1, .memory_budget_bytes = 100});
   AddTransfer("t");
   AddModel("a");
   AddModel("b");
@@ -58,7 +62,7 @@ TEST_F(ActiveJobsTest, DecompositionsStartBeforeTransfersThatWaitedLonger) {
 }
 
 TEST_F(ActiveJobsTest, OneTransferRunsBesideTheDecompositionsOfAllWorkers) {
-  jobs_.SetCapacity({.worker_count = 2, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 2, .memory_budget_bytes = 100, .transfers_yield = true});
   for (const char* digest : {"s", "t"}) AddTransfer(digest);
   for (const char* digest : {"a", "b", "c"}) AddModel(digest);
   EXPECT_THAT(Start(), ElementsAre("a", "b", "s"));
@@ -67,54 +71,54 @@ TEST_F(ActiveJobsTest, OneTransferRunsBesideTheDecompositionsOfAllWorkers) {
 }
 
 TEST_F(ActiveJobsTest, TransfersUseIdleWorkersAndLeaveThemToDecompositions) {
-  jobs_.SetCapacity({.worker_count = 2, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 2, .memory_budget_bytes = 100, .transfers_yield = true});
   for (const char* digest : {"s", "t", "u"}) AddTransfer(digest);
   EXPECT_THAT(Start(), ElementsAre("s", "t"));
   for (const char* digest : {"a", "b", "c"}) AddModel(digest);
   EXPECT_THAT(Start(), ElementsAre("a", "b"));
   End("s");
   EXPECT_THAT(Start(), IsEmpty()) << "one transfer more than there are workers runs already";
-  EXPECT_THAT(jobs_.BeginYielding(), IsEmpty()) << "no decomposition waits for memory";
+  EXPECT_THAT(jobs_->BeginYielding(), IsEmpty()) << "no decomposition waits for memory";
 }
 
 TEST_F(ActiveJobsTest, TheYoungestTransfersYieldTheMemoryForADecomposition) {
-  jobs_.SetCapacity({.worker_count = 3, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 3, .memory_budget_bytes = 100, .transfers_yield = true});
   for (const char* digest : {"s", "t", "u"}) AddTransfer(digest, 30);
   EXPECT_THAT(Start(), ElementsAre("s", "t", "u"));
   AddModel("a", 70);
   EXPECT_THAT(Start(), IsEmpty());
   EXPECT_EQ(WaitOf("a").cause(), v1::WAIT_CAUSE_MEMORY);
-  EXPECT_THAT(jobs_.BeginYielding(), ElementsAre("u", "t"));
-  EXPECT_THAT(jobs_.BeginYielding(), IsEmpty()) << "they have been chosen";
+  EXPECT_THAT(jobs_->BeginYielding(), ElementsAre("u", "t"));
+  EXPECT_THAT(jobs_->BeginYielding(), IsEmpty()) << "they have been chosen";
   for (const char* digest : {"t", "u"}) {
-    ActiveJob job = jobs_.EndRun(digest);
-    EXPECT_TRUE(job.yields);
-    jobs_.QueueAgain(std::move(job));
+    EXPECT_EQ(jobs_->EndRun(digest).stage, JobStage::kYields);
+    jobs_->Apply(digest, RunEnded{{.verdict = Verdict::kCancelled}});
+    EXPECT_EQ(jobs_->Find(digest)->stage, JobStage::kWaits);
   }
   EXPECT_THAT(Start(), ElementsAre("a"));
 }
 
 TEST_F(ActiveJobsTest, TransfersYieldOnlyWhereThatSufficesAndTakeNoMemoryThatIsWaitedFor) {
-  jobs_.SetCapacity({.worker_count = 3, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 3, .memory_budget_bytes = 100, .transfers_yield = true});
   AddModel("a", 60);
   AddTransfer("s", 10);
   EXPECT_THAT(Start(), ElementsAre("a", "s"));
   AddModel("b", 50);
   AddTransfer("t", 10);
-  EXPECT_THAT(jobs_.BeginYielding(), IsEmpty());
+  EXPECT_THAT(jobs_->BeginYielding(), IsEmpty());
   EXPECT_THAT(Start(), IsEmpty());
   EXPECT_EQ(WaitOf("t").cause(), v1::WAIT_CAUSE_MEMORY);
   EXPECT_EQ(WaitOf("b").running_job_count(), 2U);
 }
 
 TEST_F(ActiveJobsTest, TellsWhatAJobWaitsFor) {
-  jobs_.SetCapacity({.worker_count = 1, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 1, .memory_budget_bytes = 100, .transfers_yield = true});
   AddModel("a");
   AddTransfer("s");
-  EXPECT_FALSE(jobs_.View("a")->has_wait()) << "nothing keeps it from starting";
+  EXPECT_FALSE(jobs_->View("a")->has_wait()) << "nothing keeps it from starting";
   Start();
-  EXPECT_FALSE(jobs_.View("a")->has_wait()) << "it runs";
-  EXPECT_GT(jobs_.View("a")->started_unix_ms(), 0);
+  EXPECT_FALSE(jobs_->View("a")->has_wait()) << "it runs";
+  EXPECT_GT(jobs_->View("a")->started_unix_ms(), 0);
   AddModel("b");
   AddModel("c");
   EXPECT_EQ(WaitOf("b").cause(), v1::WAIT_CAUSE_WORKER);
@@ -122,8 +126,8 @@ TEST_F(ActiveJobsTest, TellsWhatAJobWaitsFor) {
   EXPECT_EQ(WaitOf("b").running_job_count(), 1U) << "the transfer does not hold it up";
   EXPECT_EQ(WaitOf("b").running_job_label(), "the a");
   EXPECT_EQ(WaitOf("c").earlier_job_count(), 1U);
-  EXPECT_EQ(jobs_.ViewAll().at("c").wait().earlier_job_count(), 1U);
-  jobs_.Add({.record = {.digest = "fine"}, .request = {}, .waits_for = "a"});
+  EXPECT_EQ(jobs_->ViewAll().at("c").wait().earlier_job_count(), 1U);
+  jobs_->Add({.record = {.digest = "fine"}, .request = {}, .waits_for = "a"});
   EXPECT_EQ(WaitOf("fine").cause(), v1::WAIT_CAUSE_COARSE_MODEL);
 }
 
@@ -138,7 +142,7 @@ class PlaceSink final : public JobSink {
 };
 
 TEST_F(ActiveJobsTest, ASinkGetsManyWaitingJobsInTimeLinearInTheirNumber) {
-  jobs_.SetCapacity({.worker_count = 1, .memory_budget_bytes = 100});
+  MakeJobs({.worker_count = 1, .memory_budget_bytes = 100});
   constexpr uint32_t kJobCount = 20'000;
   AddModel("first");
   Start();
@@ -149,9 +153,9 @@ TEST_F(ActiveJobsTest, ASinkGetsManyWaitingJobsInTimeLinearInTheirNumber) {
     return clock_.Monotonic() - begin;
   };
   PlaceSink sink;
-  const auto listed = time_of([this] { EXPECT_EQ(jobs_.ViewAll().size(), kJobCount + 1); });
-  const auto taken = time_of([&] { jobs_.WatchAll(sink); });
-  jobs_.Forget(sink);
+  const auto listed = time_of([this] { EXPECT_EQ(jobs_->ViewAll().size(), kJobCount + 1); });
+  const auto taken = time_of([&] { jobs_->WatchAll(sink); });
+  jobs_->Forget(sink);
   EXPECT_EQ(sink.begin_count, 1);
   EXPECT_EQ(sink.places.size(), kJobCount + 1);
   EXPECT_EQ(sink.places.at("jobs/waits0"), 0U);
@@ -161,16 +165,16 @@ TEST_F(ActiveJobsTest, ASinkGetsManyWaitingJobsInTimeLinearInTheirNumber) {
 }
 
 TEST_F(ActiveJobsTest, TellsThoseThatWatchWaitingJobsOfTheirPlaceInTheQueue) {
-  jobs_.SetCapacity({.worker_count = 1, .memory_budget_bytes = 100, .transfers_yield = true});
+  MakeJobs({.worker_count = 1, .memory_budget_bytes = 100, .transfers_yield = true});
   for (const char* digest : {"a", "b", "c"}) AddModel(digest);
   Start();
   std::vector<uint32_t> told;
   const auto watcher = std::make_shared<Watcher>(
       [&](const v1::Job& job) { told.push_back(job.wait().earlier_job_count()); });
-  jobs_.Watch("c", watcher).Tell();
+  jobs_->Watch("c", watcher).Tell();
   End("a");
   Start();
-  for (const Notice& news : jobs_.NewsOfWaiting()) news.Tell();
+  for (const Notice& news : jobs_->NewsOfWaiting()) news.Tell();
   EXPECT_THAT(told, ElementsAre(1, 0));
 }
 

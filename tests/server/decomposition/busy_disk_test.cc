@@ -192,6 +192,10 @@ TEST_F(BusyDiskTest, ReadersAreServedWhileACoarseModelIsCopied) {
   ASSERT_TRUE(FaultyDisk::AwaitHeldWrite());
   EXPECT_FALSE(database_->jobs().Find(DigestOf(fine))->has_value()) << "the copy is not written";
   ExpectReadersAreServed(DigestOf(Request(1)));
+  const auto keep_material = [](const std::string&, const v1::Material&) { return false; };
+  EXPECT_TRUE(ReturnsWhileHeld([&] {
+    EXPECT_TRUE(queue_->Submit(Request(1), {}, keep_material).ok());
+  })) << "whoever asks for a job that runs waits for the copy";
   FaultyDisk::ReleaseWrites();
   ASSERT_TRUE(submitted.get().ok());
   EXPECT_TRUE(queue_->Get(DigestOf(fine))->coarse_ready());
