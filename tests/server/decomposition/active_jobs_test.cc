@@ -39,7 +39,7 @@ class ActiveJobsTest : public ::testing::Test {
 
   void End(const std::string& digest) {
     jobs_->EndRun(digest);
-    jobs_->Apply(digest, RunEnded{{.verdict = Verdict::kOk}});
+    jobs_->Apply(digest, RunEnded{{.verdict = Verdict::kCancelled}});
   }
 
   v1::JobWait WaitOf(const std::string& digest) { return jobs_->View(digest)->wait(); }
