@@ -81,7 +81,10 @@ void BlowGatherer::Add(const Felt& felt, double per_second, const Roughness& rou
   const SurfaceImpulse& impulse = felt.impulse();
   const SurfaceForce force{.at = impulse.at,
                            .force_newtons = Scaled(impulse.impulse_newton_seconds, per_second)};
-  objects_[felt.handle].forces.push_back({force, roughness});
+  Object& object = objects_[felt.handle];
+  // The forces on an object that had this handle before have gone with that object.
+  if (object.serial != felt.serial) object = {.serial = felt.serial, .forces = {}};
+  object.forces.push_back({force, roughness});
 }
 
 bool BlowGatherer::HasRoom(const ObjectTouch& touch) const {
@@ -108,8 +111,10 @@ void BlowGatherer::End(Events& events) {
   std::erase_if(pairs_,
                 [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
   for (auto& [handle, object] : objects_) {
-    for (const Force& force : object.forces) events.push_back({handle, force.force, *time_s_});
-    events.push_back({handle, MakeKnot(object.forces, step_s_), *time_s_});
+    for (const Force& force : object.forces) {
+      events.push_back({handle, object.serial, force.force, *time_s_});
+    }
+    events.push_back({handle, object.serial, MakeKnot(object.forces, step_s_), *time_s_});
     object.steps_without = object.forces.empty() ? object.steps_without + 1 : 0;
     object.forces.clear();
   }
@@ -250,6 +255,7 @@ ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which, double
   part.pulse = part.pulse.Lasting(static_cast<float>(part.pulse.duration_s() * longer));
   const bool of_two = contact.count == contact.by.size();
   return {.handle = contact.by[which].handle,
+          .serial = contact.by[which].serial,
           .action = part,
           .by = of_two ? contact.by[1 - which].handle : touch.partner,
           .by_sounds = of_two};

@@ -30,6 +30,7 @@ struct BlowCounts {
 /// An action on an object at a simulation time.
 struct ForceEvent {
   uint32_t handle = 0;
+  uint64_t serial = 0;  ///< the serial of the object, see Scene::Insert
   MixerEvent::Action action{};
   double time_s = 0;
   uint32_t by = 0;         ///< the other body of a blow
@@ -103,6 +104,7 @@ class BlowGatherer {
     Roughness roughness;
   };
   struct Object {
+    uint64_t serial = 0;
     std::vector<Force> forces;  // of this step
     int steps_without = 0;
   };

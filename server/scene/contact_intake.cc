@@ -27,6 +27,16 @@ absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
 
+/// Calls `take` with at most kMostContactsAtOnce of `events` at a time.
+template <typename T, typename Take>
+void ForEachBatch(std::span<T> events, const Take& take) {
+  while (!events.empty()) {
+    const std::span<T> batch = events.first(std::min(events.size(), kMostContactsAtOnce));
+    take(batch);
+    events = events.subspan(batch.size());
+  }
+}
+
 }  // namespace
 
 ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSettings& settings)
@@ -69,6 +79,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
 }
 
 void ContactIntake::Strike(std::span<const ObjectImpulse> impulses) {
+  if (!struck_.HasRoom(impulses.size())) PushStruck();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectImpulse& impulse : impulses) {
     Note(impulse.contact, TryStrike(impulse));
@@ -85,14 +96,12 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   FeltContact felt;
   RETURN_IF_ERROR(Locate(impulse.contact, 1, felt));
   NoteZero(impulse.contact);
-  impulse_count_ += felt.count;
-  if (struck_.full()) PushStruck();
   for (size_t i = 0; i < felt.count; ++i) {
     BlowRecord blow;
     blow.handle = felt.by[i].handle;
     blow.by_sounds = felt.count == felt.by.size();
     if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
-    AddBlow(felt.by[i].event, blow, frame);
+    AddBlow(felt.by[i].serial, felt.by[i].event, blow, frame);
     struck_.Append(impulse, felt.by[i], frame);
   }
   return absl::OkStatus();
@@ -103,7 +112,6 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
   RETURN_IF_ERROR(Validate(impulse.contact.impulse));
   RETURN_IF_ERROR(Examine(std::span(&struck.felt, 1), added, 1));
   NoteZero(impulse.contact);
-  ++impulse_count_;
   struck.Add(added);
   if (settings_.blows == nullptr) return absl::OkStatus();
   MixerEvent alone = struck.felt.event;
@@ -112,7 +120,7 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
                          [](double x) { return static_cast<float>(x); });
   BlowRecord blow;
   blow.handle = struck.felt.handle;
-  AddBlow(alone, blow, struck.frame);
+  AddBlow(struck.felt.serial, alone, blow, struck.frame);
   return absl::OkStatus();
 }
 
@@ -303,33 +311,55 @@ IntakeFindings ContactIntake::findings() const {
 }
 
 void ContactIntake::PushStruck() {
-  for (StepImpulses::Struck& struck : struck_.events()) Push(struck.felt.event, struck.frame);
+  ForEachBatch(struck_.events(),
+               [this](std::span<StepImpulses::Struck> batch) { PushStruck(batch); });
   struck_.Clear();
 }
 
-void ContactIntake::Push(const BlowGatherer::Events& events) {
-  for (const ForceEvent& force : events) {
-    const MutexLock lock(&scene_.mutex());
-    const absl::StatusOr<const SoundingObject*> object = scene_.Find(force.handle);
-    if (!object.ok()) continue;  // forces on an object that was removed meanwhile are dropped
-    MixerEvent event{.bank = (*object)->bank, .action = force.action};
-    const double frame = FrameOf(force.time_s);
-    if (!CheckAhead(frame).ok()) continue;  // the end of a force, in a step that was rejected
-    if (event.impulse() != nullptr) {
-      ++impulse_count_;
-      BlowRecord blow;
-      blow.handle = force.handle;
-      blow.by = force.by;
-      blow.by_sounds = force.by_sounds;
-      AddBlow(event, blow, frame);
+void ContactIntake::PushStruck(std::span<StepImpulses::Struck> events) {
+  const MutexLock lock(&scene_.mutex());
+  for (StepImpulses::Struck& struck : events) {
+    MixerEvent& event = struck.felt.event;
+    const absl::StatusOr<const SoundingObject*> object =
+        scene_.FindSame(struck.felt.handle, struck.felt.serial);
+    if (!object.ok()) {
+      Reject(event.ReportCount(), object.status());
+      continue;
     }
-    Push(event, frame);
+    impulse_count_ += event.ReportCount();
+    event.bank = (*object)->bank;
+    Push(event, struck.frame);
   }
 }
 
-void ContactIntake::AddBlow(const MixerEvent& event, BlowRecord blow, double frame) {
+void ContactIntake::Push(std::span<const ForceEvent> events) {
+  ForEachBatch(events, [this](std::span<const ForceEvent> batch) {
+    const MutexLock lock(&scene_.mutex());
+    for (const ForceEvent& force : batch) Push(force);
+  });
+}
+
+void ContactIntake::Push(const ForceEvent& force) {
+  const absl::StatusOr<const SoundingObject*> object = scene_.FindSame(force.handle, force.serial);
+  if (!object.ok()) return;
+  MixerEvent event{.bank = (*object)->bank, .action = force.action};
+  const double frame = FrameOf(force.time_s);
+  if (!CheckAhead(frame).ok()) return;  // the end of a force, in a step that was rejected
+  if (event.impulse() != nullptr) {
+    ++impulse_count_;
+    BlowRecord blow;
+    blow.handle = force.handle;
+    blow.by = force.by;
+    blow.by_sounds = force.by_sounds;
+    AddBlow(force.serial, event, blow, frame);
+  }
+  Push(event, frame);
+}
+
+void ContactIntake::AddBlow(uint64_t serial, const MixerEvent& event, BlowRecord blow,
+                            double frame) {
   if (settings_.blows == nullptr) return;
-  const absl::StatusOr<const SoundingObject*> object = scene_.Find(blow.handle);
+  const absl::StatusOr<const SoundingObject*> object = scene_.FindSame(blow.handle, serial);
   if (!object.ok()) return;
   const SurfaceImpulse& impulse = *event.impulse();
   const auto& vertices = (*object)->body->model->vertices;

@@ -22,8 +22,8 @@
 
 namespace carillon {
 
-/// The largest number of contacts for which the scene's mutex is locked once. They take about
-/// 20 us.
+/// The largest number of contacts, or of events, for which the scene's mutex is locked once. They
+/// take about 20 us.
 inline constexpr size_t kMostContactsAtOnce = 64;
 
 /// Takes the events of an intake, and has the clock by which they are late or early.
@@ -164,12 +164,17 @@ class ContactIntake {
   void NoteZero(const ObjectContact& contact);
   /// Counts the step of a touch or a force.
   void NoteForce();
-  /// Hands on the impulses of the step so far.
+  /// Hands on the impulses of the step so far. Those on an object that was removed meanwhile are
+  /// rejected.
   void PushStruck();
-  void Push(const BlowGatherer::Events& events);
-  void Push(MixerEvent& event, double frame);
-  /// Adds the blow of `event` to the settings' blows. `blow` has its object and partner.
-  void AddBlow(const MixerEvent& event, BlowRecord blow, double frame)
+  void PushStruck(std::span<StepImpulses::Struck> events);
+  void Push(std::span<const ForceEvent> events);
+  /// Hands on a force, or a blow, unless its object was removed meanwhile.
+  void Push(const ForceEvent& force) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  void Push(MixerEvent& event, double frame) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+  /// Adds the blow of `event` to the settings' blows, unless its object, which has this serial, was
+  /// removed meanwhile. `blow` has the handles of the object and of its partner.
+  void AddBlow(uint64_t serial, const MixerEvent& event, BlowRecord blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   absl::StatusOr<double> FrameOfImpulse(double time_offset_s) const;
   /// Returns the time from the target's frame to `frame`, seconds.

@@ -83,6 +83,7 @@ void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vec
   felt.distance_m = located.distance_m * material.size;
   felt.extent_m = object.body->extent_m * material.size;
   felt.mass_kg = MassKg(object);
+  felt.serial = object.serial;
   felt.largest_newton_seconds =
       10 * felt.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
 }

@@ -25,6 +25,7 @@ struct Felt {
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.
   double largest_newton_seconds = std::numeric_limits<double>::infinity();
+  uint64_t serial = 0;  ///< the object's, on whose surface the point was found
 
   const SurfaceImpulse& impulse() const { return std::get<SurfaceImpulse>(event.action); }
 };

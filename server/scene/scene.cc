@@ -13,10 +13,13 @@ absl::StatusOr<const SoundingObject*> Scene::Find(uint32_t handle) const {
   RETURN_IF_ERROR(CheckOpenLocked());
   const auto found = objects_.find(handle);
   if (found != objects_.end()) return &found->second;
-  return Refusal(absl::StatusCode::kNotFound, "OBJECT_NOT_FOUND",
-                 absl::StrCat(name_, " has no object ", handle,
-                              ", which is unknown or removed; add it before its first contact or "
-                              "pose, and send nothing for it after its removal"));
+  return ObjectNotFound(handle);
+}
+
+absl::StatusOr<const SoundingObject*> Scene::FindSame(uint32_t handle, uint64_t serial) const {
+  ASSIGN_OR_RETURN(const SoundingObject* object, Find(handle));
+  if (object->serial != serial) return ObjectNotFound(handle);
+  return object;
 }
 
 absl::StatusOr<const SoundingObject*> Scene::Move(uint32_t handle, const Pose& pose) {
@@ -72,13 +75,16 @@ uint32_t Scene::FreeHandle() const {
 absl::Status Scene::Insert(uint32_t handle, SoundingObject object) {
   const MutexLock lock(&mutex_);
   RETURN_IF_ERROR(CheckOpenLocked());
+  object.serial = ++last_serial_;
   if (!objects_.emplace(handle, std::move(object)).second) return ObjectExists(handle);
   return absl::OkStatus();
 }
 
 absl::StatusOr<SoundingObject> Scene::Replace(uint32_t handle, SoundingObject object) {
   const MutexLock lock(&mutex_);
-  RETURN_IF_ERROR(Find(handle).status());
+  ASSIGN_OR_RETURN(const SoundingObject* replaced, Find(handle));
+  object.serial = replaced->serial;
+  object.properties.pose = replaced->properties.pose;
   return std::exchange(objects_[handle], std::move(object));
 }
 
@@ -103,6 +109,13 @@ absl::Status Scene::CheckOpenLocked() const {
   if (!closed_) return absl::OkStatus();
   return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
                  absl::StrCat(name_, " has been deleted; make another"));
+}
+
+absl::Status Scene::ObjectNotFound(uint32_t handle) const {
+  return Refusal(absl::StatusCode::kNotFound, "OBJECT_NOT_FOUND",
+                 absl::StrCat(name_, " has no object ", handle,
+                              ", which is unknown or removed; add it before its first contact or "
+                              "pose, and send nothing for it after its removal"));
 }
 
 absl::Status Scene::ObjectExists(uint32_t handle) const {

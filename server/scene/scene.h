@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 
 #include "absl/base/thread_annotations.h"
@@ -11,14 +12,17 @@
 #include "server/base/mutex.h"
 #include "server/scene/scene_space.h"
 #include "server/scene/sounding_object.h"
+#include "server/synthesis/schedule/event_stream.h"
 
 namespace carillon {
 
 /// The objects that one client makes sound together. Safe from every thread.
 ///
-/// A contact holds mutex() from the look-up of an object until its events are pushed. An object's
-/// bank is taken off the mixer only after the object was removed under the same mutex, so no event
-/// is sent to a bank that is off the mixer.
+/// Whoever sends an event to an object's bank holds mutex() from the look-up of the object until
+/// the event is pushed. An object's bank is taken off the mixer only after the object was removed
+/// or replaced under the same mutex, so no event is sent to a bank that is off the mixer. Where a
+/// place on an object was found under an earlier lock, the object's serial tells whether the object
+/// that has the handle now has the same surface.
 class Scene {
  public:
   /// `name` is "scenes/{id}". The objects sound through `bus`.
@@ -32,9 +36,24 @@ class Scene {
 
   Mutex& mutex() const ABSL_LOCK_RETURNED(mutex_) { return mutex_; }
 
+  /// Held, and locked before mutex(), while objects are put into the scene, changed and removed by
+  /// calls, so that two changes of one object do not undo each other. Contacts do not lock it.
+  Mutex& change_mutex() const ABSL_LOCK_RETURNED(change_mutex_) { return change_mutex_; }
+
+  /// The stream of the moves that come by a call and not in a contact stream. It is null until the
+  /// first such move.
+  std::unique_ptr<EventStream>& moves() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_) {
+    return moves_;
+  }
+
   /// Returns an object. Errors: NotFound (SCENE_NOT_FOUND: the scene was deleted meanwhile,
   /// OBJECT_NOT_FOUND).
   absl::StatusOr<const SoundingObject*> Find(uint32_t handle) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  /// Returns an object, unless another one has the handle now than the one with this serial.
+  /// Errors: those of Find.
+  absl::StatusOr<const SoundingObject*> FindSame(uint32_t handle, uint64_t serial) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   /// Stores the pose of an object, and returns the object. Errors: InvalidArgument (INVALID_POSE),
@@ -69,11 +88,13 @@ class Scene {
   /// Returns the smallest handle above zero that no object has.
   uint32_t FreeHandle() const;
 
-  /// Inserts an object. Errors: NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
+  /// Inserts an object, and gives it a serial that no object of the scene had before. Errors:
+  /// NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
   absl::Status Insert(uint32_t handle, SoundingObject object);
 
-  /// Replaces the object with this handle by `object`, and returns the replaced object. Errors:
-  /// those of Find.
+  /// Replaces the object with this handle by `object`, which has the same surface, and returns the
+  /// replaced object. `object` takes over the serial, and the pose, which may have changed since
+  /// `object` was made. Errors: those of Find.
   absl::StatusOr<SoundingObject> Replace(uint32_t handle, SoundingObject object);
 
   /// Removes an object and returns it. Errors: those of Find.
@@ -86,12 +107,16 @@ class Scene {
  private:
   absl::Status CheckOpenLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::Status ObjectExists(uint32_t handle) const;
+  absl::Status ObjectNotFound(uint32_t handle) const;
 
   const std::string name_;
   const BusId bus_;
-  mutable Mutex mutex_;
+  mutable Mutex change_mutex_;
+  std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
+  mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
   SceneSpace space_ ABSL_GUARDED_BY(mutex_);
   std::map<uint32_t, SoundingObject> objects_ ABSL_GUARDED_BY(mutex_);
+  uint64_t last_serial_ ABSL_GUARDED_BY(mutex_) = 0;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
 };
 

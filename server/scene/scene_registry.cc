@@ -28,7 +28,6 @@ ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change
   if (change.size) properties.material.size = *change.size;
   if (change.gain) properties.gain = *change.gain;
   if (change.radiation) properties.radiation = *change.radiation;
-  if (change.pose) properties.pose = change.pose;
   return properties;
 }
 
@@ -76,8 +75,9 @@ std::string SceneRegistry::NameOf(uint64_t scene) const {
 }
 
 absl::Status SceneRegistry::DeleteScene(uint64_t scene) {
-  const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  const MutexLock change_lock(&found->change_mutex());
+  RETURN_IF_ERROR(found->CheckOpen());
   const std::map<uint32_t, SoundingObject> objects = found->Close();
   for (const auto& [handle, object] : objects) mixer_.FadeOut(object.bank);
   volumes_.Close(scene);
@@ -160,11 +160,11 @@ absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::ListObjects(uint64_t sc
 
 absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_t handle,
                                                          const ObjectChange& change) {
-  const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ValidateGlide(change.glide_s));
   if (change.pose) RETURN_IF_ERROR(Validate(*change.pose));
-  if (change.pose) RETURN_IF_ERROR(AwaitRoomForMoves(1));
+  const MutexLock change_lock(&found->change_mutex());
+  if (change.pose) RETURN_IF_ERROR(AwaitRoomForMoves(*found, 1));
   ASSIGN_OR_RETURN(const SoundingObject old, found->Copy(handle));
   if (change.material || change.size || change.gain || change.radiation) {
     ASSIGN_OR_RETURN(SoundingObject object, Remake(old, Changed(old.properties, change)));
@@ -174,32 +174,33 @@ absl::StatusOr<PlacedObject> SceneRegistry::UpdateObject(uint64_t scene, uint32_
   if (change.pose) {
     const MutexLock lock(&found->mutex());
     ASSIGN_OR_RETURN(const SoundingObject* object, found->Move(handle, *change.pose));
-    SendMove(*object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
+    SendMove(*found->moves(), *object, ObjectMove{MotionOf(*change.pose, change.glide_s)});
   }
   ASSIGN_OR_RETURN(SoundingObject object, found->Copy(handle));
   return PlacedObject{.handle = handle, .object = std::move(object)};
 }
 
 absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, double glide_s) {
-  const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
   RETURN_IF_ERROR(ValidateGlide(glide_s));
-  RETURN_IF_ERROR(AwaitRoomForMoves(found->object_count()));
+  const MutexLock change_lock(&found->change_mutex());
+  RETURN_IF_ERROR(AwaitRoomForMoves(*found, found->object_count()));
   const MutexLock lock(&found->mutex());
   ASSIGN_OR_RETURN(const auto* objects, found->MoveListener(pose));
   for (const auto& [handle, object] : *objects) {
-    SendMove(object, ListenerMove{MotionOf(pose, glide_s)});
+    SendMove(*found->moves(), object, ListenerMove{MotionOf(pose, glide_s)});
   }
   return absl::OkStatus();
 }
 
-absl::Status SceneRegistry::AwaitRoomForMoves(size_t count) {
-  if (moves_ == nullptr) {
-    ASSIGN_OR_RETURN(moves_, mixer_.OpenStream(kMaxObjectCount));
+absl::Status SceneRegistry::AwaitRoomForMoves(Scene& scene, size_t count) {
+  std::unique_ptr<EventStream>& moves = scene.moves();
+  if (moves == nullptr) {
+    ASSIGN_OR_RETURN(moves, mixer_.OpenStream(kMaxObjectCount));
   }
   // The mixer takes thousands of events in each block.
   constexpr absl::Duration kLongest = absl::Milliseconds(200), kPause = absl::Microseconds(500);
-  for (absl::Duration waited; moves_->room() < count; waited += kPause) {
+  for (absl::Duration waited; moves->room() < count; waited += kPause) {
     if (waited >= kLongest) {
       return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_MOVES",
                      "the mixer has not taken the poses of earlier calls yet, so nothing was "
@@ -211,8 +212,9 @@ absl::Status SceneRegistry::AwaitRoomForMoves(size_t count) {
 }
 
 /// The event has time zero, so it takes effect at once.
-void SceneRegistry::SendMove(const SoundingObject& object, const MixerEvent::Action& move) {
-  if (object.voice != nullptr) moves_->TryPush({.bank = object.bank, .action = move});
+void SceneRegistry::SendMove(EventStream& moves, const SoundingObject& object,
+                             const MixerEvent::Action& move) {
+  if (object.voice != nullptr) moves.TryPush({.bank = object.bank, .action = move});
 }
 
 Motion SceneRegistry::MotionOf(const Pose& pose, double glide_s) const {
@@ -220,8 +222,8 @@ Motion SceneRegistry::MotionOf(const Pose& pose, double glide_s) const {
 }
 
 absl::Status SceneRegistry::RemoveObject(uint64_t scene, uint32_t handle) {
-  const MutexLock change_lock(&change_mutex_);
   ASSIGN_OR_RETURN(const std::shared_ptr<Scene> found, FindScene(scene));
+  const MutexLock change_lock(&found->change_mutex());
   ASSIGN_OR_RETURN(const SoundingObject removed, found->Remove(handle));
   mixer_.FadeOut(removed.bank);
   const MutexLock lock(&mutex_);

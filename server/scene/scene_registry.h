@@ -193,9 +193,10 @@ class SceneRegistry {
   void TakeOverTransfer(Scene& scene, uint32_t handle, const SoundingObject& old);
   /// Waits until this number of moves can be sent. Errors: ResourceExhausted (TOO_MANY_MOVES,
   /// TOO_MANY_STREAMS).
-  absl::Status AwaitRoomForMoves(size_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
-  void SendMove(const SoundingObject& object, const MixerEvent::Action& move)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
+  absl::Status AwaitRoomForMoves(Scene& scene, size_t count)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene.change_mutex());
+  static void SendMove(EventStream& moves, const SoundingObject& object,
+                       const MixerEvent::Action& move);
   Motion MotionOf(const Pose& pose, double glide_s) const;
 
   Mixer& mixer_;
@@ -206,12 +207,7 @@ class SceneRegistry {
   /// The number of calls of TakeOverTransfers. Objects during whose making it grows may lack a
   /// transfer.
   std::atomic<uint64_t> transfer_round_{0};
-  /// Held while objects are put into a scene, changed and removed, so that two changes of one
-  /// object do not undo each other. Contacts do not lock it.
-  Mutex change_mutex_;
-  /// Carries moves that come by a call and not in a contact stream. The first such move opens it.
-  std::unique_ptr<EventStream> moves_ ABSL_GUARDED_BY(change_mutex_);
-  mutable Mutex mutex_ ABSL_ACQUIRED_AFTER(change_mutex_);
+  mutable Mutex mutex_;
   std::map<uint64_t, std::shared_ptr<Scene>> scenes_ ABSL_GUARDED_BY(mutex_);
   /// The number of each scene by its id.
   std::map<std::string, uint64_t> numbers_ ABSL_GUARDED_BY(mutex_);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The functions of SceneRegistry that make oscillator banks for many objects. They lock
-// change_mutex_ only after the banks are made, because a thousand banks take half a second.
+// The functions of SceneRegistry that make oscillator banks for many objects. They lock the scene's
+// change_mutex() only after the banks are made, because a thousand banks take half a second.
 #include <set>
 #include <utility>
 #include <vector>
@@ -133,12 +133,12 @@ void SceneRegistry::FadeOut(std::span<const PlacedObject> objects) {
 
 absl::Status SceneRegistry::Place(Scene& scene, std::span<const NewObject> objects, ElementError at,
                                   std::vector<PlacedObject>& made) {
-  const MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&scene.change_mutex());
   ASSIGN_OR_RETURN(const std::vector<uint32_t> handles, ChooseHandles(scene, objects, at));
   for (size_t i = 0; i < made.size(); ++i) {
     made[i].handle = handles[i];
     // The first insertion fails if the scene was deleted. The others cannot fail, because every
-    // change of the scene holds change_mutex_.
+    // change of the scene holds its change_mutex().
     RETURN_IF_ERROR(scene.Insert(handles[i], made[i].object));
   }
   return absl::OkStatus();
@@ -146,12 +146,13 @@ absl::Status SceneRegistry::Place(Scene& scene, std::span<const NewObject> objec
 
 void SceneRegistry::CatchUp(Scene& scene, std::span<const PlacedObject> placed,
                             const Pose& listener) {
+  const MutexLock change_lock(&scene.change_mutex());
   const Pose now = scene.space().listener;
-  if (now == listener) return;
-  const MutexLock change_lock(&change_mutex_);
-  if (!AwaitRoomForMoves(placed.size()).ok()) return;
+  if (now == listener || !AwaitRoomForMoves(scene, placed.size()).ok()) return;
+  const MutexLock lock(&scene.mutex());
   for (const PlacedObject& object : placed) {
-    SendMove(object.object, ListenerMove{MotionOf(now, 0)});
+    const absl::StatusOr<const SoundingObject*> found = scene.Find(object.handle);
+    if (found.ok()) SendMove(*scene.moves(), **found, ListenerMove{MotionOf(now, 0)});
   }
 }
 
@@ -188,14 +189,13 @@ void SceneRegistry::TakeOverTransfer(Scene& scene, uint32_t handle, const Soundi
   // An object that cannot be made anew, for instance because the mixer is full, stays unchanged.
   absl::StatusOr<SoundingObject> object = Remake(old, old.properties);
   if (!object.ok()) return;
-  const MutexLock change_lock(&change_mutex_);
+  const MutexLock change_lock(&scene.change_mutex());
   const absl::StatusOr<SoundingObject> now = scene.Copy(handle);
   if (!now.ok() || now->bank != old.bank) {
     // The object was removed or changed meanwhile. A changed object has the new transfer already.
     mixer_.FadeOut(object->bank);
     return;
   }
-  object->properties.pose = now->properties.pose;
   scene.Replace(handle, *std::move(object)).IgnoreError();
   mixer_.LetRingOut(old.bank);
 }

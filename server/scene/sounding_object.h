@@ -54,6 +54,8 @@ struct SoundingObject {
   bool clicks = false;  ///< whether the acceleration of the body by each blow sounds, too
   /// The transfer by which the modes radiate; null if they radiate by the paper's coupling.
   std::shared_ptr<const Transfer> transfer = nullptr;
+  /// Tells the object from others that had its handle in its scene before; see Scene::Insert.
+  uint64_t serial = 0;
 };
 
 /// Returns the transfer that an object's properties ask for, or null for the paper's coupling.

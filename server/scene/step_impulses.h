@@ -47,8 +47,10 @@ class StepImpulses {
   /// Appends the event of `impulse` on one of its objects.
   void Append(const ObjectImpulse& impulse, const Felt& felt, double frame);
 
-  /// Returns whether the events must be cleared before further ones are appended.
-  bool full() const { return struck_.size() + kMostObjects > kMostEvents; }
+  /// Returns whether the events of this many impulses may be appended before Clear is called.
+  bool HasRoom(size_t impulse_count) const {
+    return struck_.size() + kMostObjects * impulse_count <= kMostEvents;
+  }
 
   std::span<Struck> events() { return struck_; }
   void Clear();
