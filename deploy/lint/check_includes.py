@@ -73,7 +73,7 @@ def check_sources(root, rules):
 
 
 def depends_of(arguments):
-    found = re.search(r"\bDEPENDS\b(.*?)(?:\b(?:SOURCES|LIBRARIES|LABELS)\b|$)", arguments, re.S)
+    found = re.search(r"\bDEPENDS\b(.*?)(?:\b(?:SOURCES|LIBRARIES|LABELS|ONCE_A_CALL)\b|$)", arguments, re.S)
     return found[1].split() if found else []
 
 
