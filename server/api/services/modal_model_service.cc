@@ -42,7 +42,7 @@ absl::string_view NameOf(v1::JobState state) {
 }
 
 /// The event for a job that was requested. A job may have ended before, with success or not.
-Event Submitted(const v1::Job& job) {
+Event SubmittedEvent(const v1::Job& job) {
   return Event("job_submitted")
       .With("job", job.name())
       .WithSome("label", job.label())
@@ -88,7 +88,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
         };
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check,
                                                                  caller.has(Role::kAdminister)));
-        daemon_.writing.events.LogSubmitted(Submitted(response->job()), caller);
+        daemon_.writing.events.LogSubmitted(SubmittedEvent(response->job()), caller);
         return absl::OkStatus();
       });
 }
@@ -106,7 +106,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
             *response->mutable_job(),
             queue_.SubmitTransfer(digest, whole, caller.client, caller.has(Role::kAdminister)));
         daemon_.writing.events.LogSubmitted(
-            Submitted(response->job()).With("transfer_of", request->modal_model()), caller);
+            SubmittedEvent(response->job()).With("transfer_of", request->modal_model()), caller);
         return absl::OkStatus();
       });
 }
