@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "proto/cpp/program/escaped_text.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "proto/cpp/utf8.h"
 
@@ -50,6 +52,13 @@ std::string EscapedText(std::string_view text) {
     text.remove_prefix(size > 0 ? size : 1);
   }
   return escaped;
+}
+
+std::string QuotedText(std::string_view text) {
+  constexpr size_t kMostBytes = 60;
+  size_t end = std::min(text.size(), kMostBytes);
+  while (end > 0 && end < text.size() && ContinuesCharacter(text[end])) --end;
+  return absl::StrCat("\"", EscapedText(text.substr(0, end)), end < text.size() ? "...\"" : "\"");
 }
 
 }  // namespace carillon
