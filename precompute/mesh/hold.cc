@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "precompute/mesh/point_math.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -83,8 +84,9 @@ class FixedNodeFinder {
 
   absl::Status operator()(const FixedPlane& plane) {
     const double length = Norm(plane.normal);
+    const Point point = Difference(plane.point_m, names_.origin_m);
     FixWhere([&](const Point& p) {
-      return Dot(Difference(p, plane.point_m), plane.normal) <= tolerance_m_ * length;
+      return Dot(Difference(p, point), plane.normal) <= tolerance_m_ * length;
     });
     if (any_) return absl::OkStatus();
     return NoNodeFixed("the plane",
@@ -93,11 +95,12 @@ class FixedNodeFinder {
   }
 
   absl::Status operator()(const FixedBox& box) {
+    const Point low = Difference(box.low_m, names_.origin_m);
+    const Point high = Difference(box.high_m, names_.origin_m);
     FixWhere([&](const Point& p) {
       bool inside = true;
       for (size_t x = 0; x < 3; ++x) {
-        inside =
-            inside && p[x] >= box.low_m[x] - tolerance_m_ && p[x] <= box.high_m[x] + tolerance_m_;
+        inside = inside && p[x] >= low[x] - tolerance_m_ && p[x] <= high[x] + tolerance_m_;
       }
       return inside;
     });
@@ -127,7 +130,7 @@ class FixedNodeFinder {
     FixSimplices(*group);
     if (any_) return absl::OkStatus();
     return NoNodeFixed(
-        absl::StrCat("the group \"", asked.name, "\""),
+        absl::StrCat("the group ", QuotedText(asked.name)),
         "no part of it is on the boundary of the body; name another group, a plane or a box");
   }
 
@@ -245,13 +248,13 @@ class FixedNodeFinder {
 
   absl::Status NoSuchGroup(const std::string& name) const {
     std::vector<std::string> known;
-    for (const MeshGroup& group : names_.groups) known.push_back(group.name);
+    for (const MeshGroup& group : names_.groups) known.push_back(QuotedText(group.name));
     std::ranges::sort(known);
     const size_t told = std::min(known.size(), kMaxNamesTold);
     const std::string list =
         absl::StrJoin(known.begin(), known.begin() + static_cast<ptrdiff_t>(told), ", ");
     return Refusal(absl::StatusCode::kInvalidArgument, "GROUP_UNKNOWN",
-                   absl::StrCat("the mesh file has no group \"", name, "\": ",
+                   absl::StrCat("the mesh file has no group ", QuotedText(name), ": ",
                                 known.empty() ? "it names none; fix a plane or a box"
                                               : absl::StrCat("it has ", list,
                                                              told < known.size() ? ", ..." : "")));

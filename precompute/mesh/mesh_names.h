@@ -30,6 +30,9 @@ struct MeshNames {
   /// numbers.
   absl::flat_hash_map<int64_t, Point> vertices = {};
   std::vector<MeshGroup> groups = {};
+  /// The place in the file, metres, from which all positions of the mesh are counted. It is zero
+  /// unless the body lies so far away that single precision would not resolve it.
+  Point origin_m = {0, 0, 0};
 };
 
 /// The content of a mesh file, which is a surface still to be filled, or a mesh of tetrahedra ready
@@ -39,6 +42,8 @@ using Mesh = std::variant<SurfaceMesh, TetMesh>;
 struct NamedMesh {
   Mesh mesh;
   MeshNames names = {};
+  /// What the reader left out or changed, for the user.
+  std::vector<std::string> warnings = {};
 };
 
 }  // namespace carillon::precompute

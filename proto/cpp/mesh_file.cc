@@ -82,20 +82,13 @@ void AddUri(Value& buffer, std::vector<std::string*>& uris) {
   if (IsExternal(uri->second.string_value())) uris.push_back(uri->second.mutable_string_value());
 }
 
-/// Returns the addresses of all files with buffers. The buffers are an array in glTF 2.0, and an
-/// object in glTF 1.0.
+/// Returns the addresses of all files with buffers.
 std::vector<std::string*> ExternalUris(Struct& document) {
   std::vector<std::string*> uris;
   const auto buffers = document.mutable_fields()->find("buffers");
-  if (buffers == document.mutable_fields()->end()) return uris;
-  if (buffers->second.has_list_value()) {
-    for (Value& buffer : *buffers->second.mutable_list_value()->mutable_values()) {
-      AddUri(buffer, uris);
-    }
-  } else if (buffers->second.has_struct_value()) {
-    for (auto& [name, buffer] : *buffers->second.mutable_struct_value()->mutable_fields()) {
-      AddUri(buffer, uris);
-    }
+  if (buffers == document.mutable_fields()->end() || !buffers->second.has_list_value()) return uris;
+  for (Value& buffer : *buffers->second.mutable_list_value()->mutable_values()) {
+    AddUri(buffer, uris);
   }
   return uris;
 }
@@ -152,13 +145,6 @@ std::string MeshFormatOf(const std::string& path) {
   const std::string suffix = std::filesystem::path(path).extension();
   const std::string format = absl::AsciiStrToLower(absl::StripPrefix(suffix, "."));
   return format == "ele" ? "node" : format;
-}
-
-std::string ExternalBuffer(const std::string& gltf) {
-  Struct document;
-  if (!ReadDocument(gltf, document)) return "";
-  const std::vector<std::string*> uris = ExternalUris(document);
-  return uris.empty() ? "" : *uris[0];
 }
 
 absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format) {

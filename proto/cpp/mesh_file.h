@@ -11,10 +11,6 @@ namespace carillon {
 /// names "node". The format need not be known.
 std::string MeshFormatOf(const std::string& path);
 
-/// Returns the name of the first file that the glTF document needs for its buffers, or an empty
-/// string if all buffers are in the document. A text that is no JSON names no file.
-std::string ExternalBuffer(const std::string& gltf);
-
 /// Reads a mesh file as UploadMesh takes it: in one piece, with the data of other files that belong
 /// to it.
 ///

@@ -34,7 +34,10 @@ struct ElementFile {
   std::vector<std::array<int64_t, 3>>
       triangles;  ///< triangles of surfaces that bound or divide the body
   std::vector<Group> groups;
+  std::vector<std::string> warnings;  ///< what the reader left out, for the user
 
+  /// Returns the group of that name, new if there was none.
+  Group& Named(const std::string& name);
   /// Adds a simplex to each of the named groups.
   void AddToGroups(std::span<const std::string> names, std::span<const int64_t> corners);
   /// Adds the triangle or triangles (one, two or four) into which a face is split.
@@ -42,9 +45,6 @@ struct ElementFile {
                     std::span<const std::array<int64_t, 3>> pieces);
   /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (a file has both kinds).
   absl::Status AddTetrahedron(std::span<const int64_t> nodes_of_one);
-
- private:
-  Group& Named(const std::string& name);
 };
 
 /// Checks the number of nodes of a file. Errors: MESH_TOO_LARGE if it exceeds the limit.

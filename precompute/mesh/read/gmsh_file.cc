@@ -7,8 +7,10 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -16,6 +18,7 @@
 #include "precompute/mesh/read/gmsh_elements.h"
 #include "precompute/mesh/read/text_lines.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -26,23 +29,55 @@ class GmshParser {
   explicit GmshParser(const std::string& bytes) : lines_(bytes) {}
 
   absl::StatusOr<ElementFile> Parse() && {
-    std::string_view line;
-    while (lines_.Next(line)) {
-      absl::Status status = absl::OkStatus();
-      if (line == "$MeshFormat") status = ReadFormat();
-      if (line == "$PhysicalNames") status = ReadPhysicalNames();
-      if (line == "$Entities" && is_41_) status = Read41(&Gmsh41Sections::ReadEntities);
-      if (line == "$Nodes") status = is_41_ ? Read41(&Gmsh41Sections::ReadNodes) : ReadNodes();
-      if (line == "$Elements") {
-        status = is_41_ ? Read41(&Gmsh41Sections::ReadElements) : ReadElements();
-      }
-      if (!status.ok()) return status;
+    while (const std::optional<std::string_view> section = NextSection()) {
+      if (*section == "$NOD" || *section == "$ELM") return Unreadable("its version is 1");
+      RETURN_IF_ERROR(ReadSection(*section));
+      RETURN_IF_ERROR(EndSection(*section));
     }
     if (!has_format_) return Unreadable("it has no $MeshFormat");
     return std::move(elements_.file);
   }
 
  private:
+  /// Returns the next line that begins with '$', without the blanks behind it.
+  std::optional<std::string_view> NextSection() {
+    std::string_view line;
+    while (lines_.Next(line)) {
+      const std::vector<std::string_view> words = TextLines::Words(line);
+      if (!words.empty() && words[0].starts_with('$')) return words[0];
+    }
+    return std::nullopt;
+  }
+
+  absl::Status ReadSection(std::string_view section) {
+    if (section == "$MeshFormat") return ReadFormat();
+    if (section == "$PhysicalNames") return ReadPhysicalNames();
+    if (section == "$Entities" && is_41_) return Read41(&Gmsh41Sections::ReadEntities);
+    if (section == "$Nodes" || section == "$ParametricNodes") {
+      if (!is_41_) return ReadNodes(section != "$Nodes");
+      return Read41(&Gmsh41Sections::ReadNodes);
+    }
+    if (section != "$Elements") return absl::OkStatus();
+    return is_41_ ? Read41(&Gmsh41Sections::ReadElements) : ReadElements();
+  }
+
+  /// Passes over what is left of a section. The format lets readers ignore sections that they do
+  /// not know, but the nodes and elements must end where their numbers say.
+  absl::Status EndSection(std::string_view section) {
+    const std::string end = "$End" + std::string(section.substr(1));
+    const bool is_read =
+        section == "$Nodes" || section == "$ParametricNodes" || section == "$Elements";
+    std::string_view line;
+    while (lines_.Next(line)) {
+      const std::vector<std::string_view> words = TextLines::Words(line);
+      if (!words.empty() && words[0] == end) return absl::OkStatus();
+      if (is_read && !words.empty()) {
+        return lines_.Unreadable(absl::StrCat("no ", end, " where the section says that it ends"));
+      }
+    }
+    return Unreadable(absl::StrCat("the file ends before ", EscapedText(end.substr(0, 60))));
+  }
+
   static absl::Status Unreadable(absl::string_view what) {
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
                    absl::StrCat("the file cannot be read as Gmsh MSH 2.2 or 4.1: ", what,
@@ -54,10 +89,9 @@ class GmshParser {
     if (words.size() != 3) return lines_.Unreadable("no mesh format of Gmsh");
     is_41_ = words[0] == "4.1";
     if (!is_41_ && !words[0].starts_with("2.")) {
-      return Unreadable(
-          absl::StrCat("its version is ", absl::string_view(words[0].data(), words[0].size())));
+      return Unreadable(absl::StrCat("its version is ", QuotedText(words[0])));
     }
-    if (is_41_ && words[2] != "8") return Unreadable("its numbers have not eight bytes");
+    if (words[2] != "8") return Unreadable("its numbers have not eight bytes");
     has_format_ = true;
     is_binary_ = words[1] == "1";
     int32_t one = 1;
@@ -103,7 +137,14 @@ class GmshParser {
     return absl::OkStatus();
   }
 
-  absl::Status ReadNodes() {
+  /// "number x y z". Parametric nodes go on with the entity on which they lie, and their place on
+  /// it.
+  absl::Status ReadNodes(bool parametric) {
+    if (parametric && is_binary_) {
+      return Unreadable(
+          "it has binary $ParametricNodes: switch off the option Mesh.SaveParametric, or save "
+          "text");
+    }
     ASSIGN_OR_RETURN(const size_t count, ReadCount());
     RETURN_IF_ERROR(CheckNodeCountOfFile(count));
     for (size_t i = 0; i < count; ++i) {
@@ -115,8 +156,8 @@ class GmshParser {
         }
       } else {
         const auto words = lines_.NextWords();
-        if (words.size() != 4 || !Assign(words[0], number) || !Assign(words[1], p[0]) ||
-            !Assign(words[2], p[1]) || !Assign(words[3], p[2])) {
+        if (words.size() < 4 || (words.size() > 4 && !parametric) || !Assign(words[0], number) ||
+            !Assign(words[1], p[0]) || !Assign(words[2], p[1]) || !Assign(words[3], p[2])) {
           return lines_.Unreadable("no node (\"number x y z\")");
         }
       }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/boundary.h"
@@ -39,12 +40,31 @@ absl::Status CheckFinite(const ElementFile& file) {
 
 using NodeOfNumber = absl::flat_hash_map<int64_t, int32_t>;
 
-NodeOfNumber NumberNodes(const ElementFile& file) {
+absl::StatusOr<NodeOfNumber> NumberNodes(const ElementFile& file) {
   NodeOfNumber node_of_number;
   for (size_t n = 0; n < file.node_numbers.size(); ++n) {
-    node_of_number[file.node_numbers[n]] = static_cast<int32_t>(n);
+    const auto [found, is_new] =
+        node_of_number.try_emplace(file.node_numbers[n], static_cast<int32_t>(n));
+    if (is_new || file.nodes[static_cast<size_t>(found->second)] == file.nodes[n]) continue;
+    return Refuse("MESH_UNREADABLE",
+                  absl::StrCat("the file has node ", file.node_numbers[n],
+                               " twice, at different places: number nodes once"));
   }
   return node_of_number;
+}
+
+/// Warns of faces beside the tetrahedra, such as a shell that is attached to them: they are no part
+/// of the body.
+void WarnOfOtherFaces(ElementFile& file) {
+  const absl::flat_hash_set<int64_t> of_tetrahedra(file.elements.begin(), file.elements.end());
+  const auto is_other = [&](const std::array<int64_t, 3>& triangle) {
+    return std::ranges::any_of(triangle, [&](int64_t n) { return !of_tetrahedra.contains(n); });
+  };
+  const auto count = std::ranges::count_if(file.triangles, is_other);
+  if (count == 0) return;
+  file.warnings.push_back(absl::StrCat(count,
+                                       " triangles of the file have nodes that belong to no "
+                                       "tetrahedron, and were left out"));
 }
 
 /// The nodes of elements, as indices into `file.nodes`.
@@ -212,6 +232,7 @@ absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& 
   ASSIGN_OR_RETURN(std::vector<int32_t> elements,
                    FindNodes(file.elements, static_cast<size_t>(file.nodes_per_element),
                              "tetrahedron", node_of_number));
+  WarnOfOtherFaces(file);
   TetMesh mesh{std::move(file.nodes), file.nodes_per_element, std::move(elements), {}};
   const std::vector<int32_t> new_index = DropUnusedNodes(mesh);
   RETURN_IF_ERROR(OrientElements(mesh));
@@ -220,7 +241,7 @@ absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& 
   }
   RETURN_IF_ERROR(FindBoundary(mesh));
   MeshNames names = NamesOf(file, node_of_number, new_index, mesh);
-  return NamedMesh{std::move(mesh), std::move(names)};
+  return NamedMesh{std::move(mesh), std::move(names), std::move(file.warnings)};
 }
 
 /// A file of triangles alone, whose groups are of triangles, too.
@@ -232,7 +253,7 @@ absl::StatusOr<NamedMesh> MakeSurface(const ElementFile& file, const NodeOfNumbe
   for (size_t i = 0; i < nodes.size(); ++i) {
     triangles[i / 3][i % 3] = file.nodes[static_cast<size_t>(nodes[i])];
   }
-  NamedMesh named{MergeVertices(triangles)};
+  NamedMesh named{.mesh = MergeVertices(triangles), .names = {}, .warnings = file.warnings};
   for (size_t n = 0; n < file.nodes.size(); ++n) {
     named.names.vertices[file.node_numbers[n]] = file.nodes[n];
   }
@@ -246,7 +267,7 @@ absl::StatusOr<NamedMesh> MakeSurface(const ElementFile& file, const NodeOfNumbe
 
 absl::StatusOr<NamedMesh> MakeMesh(ElementFile file) {
   RETURN_IF_ERROR(CheckFinite(file));
-  const NodeOfNumber node_of_number = NumberNodes(file);
+  ASSIGN_OR_RETURN(const NodeOfNumber node_of_number, NumberNodes(file));
   if (!file.elements.empty()) return MakeTetrahedra(file, node_of_number);
   if (!file.triangles.empty()) return MakeSurface(file, node_of_number);
   return Refuse(

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/number_stream.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -31,18 +32,26 @@ constexpr std::array<MeditKind, 7> kMeditKinds = {{{"Edges", 1, 2, 2},
                                                    {"Tetrahedra", 3, 4, 4},
                                                    {"TetrahedraP2", 3, 10, 4}}};
 
-/// Elements that fill volume and are no tetrahedra.
-constexpr std::array<std::string_view, 6> kOtherVolumes = {
-    "Hexahedra", "HexahedraQ2", "Prisms", "PrismsP2", "Pyramids", "PyramidsP2"};
+/// Beginnings of the names of sections with elements and faces. Those that kMeditKinds does not
+/// have are not read.
+constexpr std::array<std::string_view, 8> kElementNames = {"Hexahedra", "Prisms",    "Pyramids",
+                                                           "Polyhedra", "Polygons",  "Triangles",
+                                                           "Quadrilat", "Tetrahedra"};
 
 class MeditParser {
  public:
   explicit MeditParser(const std::string& bytes) : bytes_(bytes), stream_(bytes, false) {}
 
   absl::StatusOr<ElementFile> Parse() && {
-    if (stream_.NextWord() != "MeshVersionFormatted") return Unreadable("it is no text of Medit");
+    int version = 0;
+    if (stream_.NextWord() != "MeshVersionFormatted" || !stream_.Take(version)) {
+      return Unreadable("it is no text of Medit");
+    }
     for (std::string_view word = stream_.NextWord(); !word.empty() && word != "End";
          word = stream_.NextWord()) {
+      if (std::isalpha(static_cast<unsigned char>(word[0])) == 0) {
+        return Unreadable(absl::StrCat(QuotedText(word), " where a section begins"));
+      }
       RETURN_IF_ERROR(ReadSection(word));
     }
     ChooseGroups();
@@ -51,11 +60,10 @@ class MeditParser {
 
  private:
   absl::Status Unreadable(absl::string_view what) const {
-    const auto lines = std::count(
-        bytes_.begin(), bytes_.end() - static_cast<ptrdiff_t>(stream_.rest().size()), '\n');
     return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
-                   absl::StrCat("the file cannot be read as Medit's .mesh: line ", lines + 1, ": ",
-                                what, ". Export the mesh again, as text"));
+                   absl::StrCat("the file cannot be read as Medit's .mesh: line ",
+                                LineOf(bytes_, stream_.rest()), ": ", what,
+                                ". Export the mesh again, as text"));
   }
 
   absl::Status ReadSection(std::string_view keyword) {
@@ -64,9 +72,10 @@ class MeditParser {
     const auto* kind = std::ranges::find(kMeditKinds, keyword, &MeditKind::keyword);
     if (kind != kMeditKinds.end()) return ReadElements(*kind);
     uint64_t count = 0;
-    if (std::ranges::find(kOtherVolumes, keyword) != kOtherVolumes.end() && stream_.Take(count) &&
-        count > 0) {
-      return UnsupportedElements(absl::string_view(keyword.data(), keyword.size()));
+    const bool has_elements = std::ranges::any_of(
+        kElementNames, [&](std::string_view name) { return keyword.starts_with(name); });
+    if (has_elements && stream_.Take(count) && count > 0) {
+      return UnsupportedElements(EscapedText(keyword.substr(0, 60)));
     }
     // Skips any other section up to the next keyword.
     for (std::string_view word = stream_.PeekWord();

@@ -2,12 +2,19 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <string_view>
 
 #include "precompute/mesh/read/text_lines.h"
 
 namespace carillon::precompute {
+
+/// Returns the number, counted from 1, of the line of `text` in which its part `rest` begins.
+inline int64_t LineOf(std::string_view text, std::string_view rest) {
+  return 1 + std::count(text.begin(), text.end() - static_cast<ptrdiff_t>(rest.size()), '\n');
+}
 
 /// Reads numbers one after the other, from the words of a text (a '#' begins a comment that ends
 /// with the line) or from bytes in the machine's own representation.
@@ -45,6 +52,9 @@ class NumberStream {
     SkipBlanks();
     return rest_.substr(0, std::min(rest_.find_first_of(" \t\r\v\f\n#"), rest_.size()));
   }
+
+  /// Skips the rest of the line of a text.
+  void SkipLine() { rest_.remove_prefix(std::min(rest_.find_first_of("\r\n"), rest_.size())); }
 
   std::string_view rest() const { return rest_; }
 

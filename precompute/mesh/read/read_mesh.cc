@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/read/read_mesh.h"
 
+#include <algorithm>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "precompute/mesh/read/far_origin.h"
 #include "precompute/mesh/read/gmsh_file.h"
 #include "precompute/mesh/read/inp_file.h"
 #include "precompute/mesh/read/make_mesh.h"
@@ -17,6 +21,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/mesh_file.h"
 #include "proto/cpp/mesh_format.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -31,6 +36,40 @@ void Scale(NamedMesh& named, double factor) {
   auto& points = surface != nullptr ? surface->vertices : std::get<TetMesh>(named.mesh).nodes;
   for (Point& p : points) Scale(p, factor);
   for (auto& [number, p] : named.names.vertices) Scale(p, factor);
+  Scale(named.names.origin_m, factor);
+}
+
+/// Moves a body that lies too far from the origin for the stored model, and says so.
+void MoveNear(NamedMesh& named) {
+  const auto* tetrahedra = std::get_if<TetMesh>(&named.mesh);
+  const auto& points =
+      tetrahedra != nullptr ? tetrahedra->nodes : std::get<SurfaceMesh>(named.mesh).vertices;
+  if (named.names.origin_m == Point{0, 0, 0} && !points.empty()) {
+    CountFrom(FarOrigin(points), named);
+  }
+  const Point& origin = named.names.origin_m;
+  if (origin == Point{0, 0, 0}) return;
+  named.warnings.push_back(absl::StrFormat(
+      "the body lies so far from the origin that single precision does not resolve it; the places "
+      "of the model are counted from (%.15g, %.15g, %.15g) m, fixtures from the file's origin",
+      origin[0], origin[1], origin[2]));
+}
+
+/// Returns the text of a file whose characters or ends of lines no reader expects, and nothing if
+/// the bytes can be read as they are. Old editors of the Macintosh end lines by a carriage return
+/// alone.
+std::optional<std::string> PlainText(const std::string& bytes) {
+  std::optional<std::string> text = Utf8OfUtf16(bytes);
+  const std::string_view unmarked = WithoutByteOrderMark(bytes);
+  if (!text && unmarked.size() < bytes.size()) text = std::string(unmarked);
+  const std::string& now = text ? *text : bytes;
+  const bool ends_lines_by_return = now.find('\n') == std::string::npos &&
+                                    now.find('\r') != std::string::npos &&
+                                    now.find('\0') == std::string::npos;
+  if (!ends_lines_by_return) return text;
+  std::string lines = now;
+  std::ranges::replace(lines, '\r', '\n');
+  return lines;
 }
 
 absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::string& format) {
@@ -54,13 +93,14 @@ absl::StatusOr<NamedMesh> ParseMesh(const std::string& bytes, const std::string&
   if (known == nullptr) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_FORMAT_UNKNOWN",
-        absl::StrCat("there is no mesh format \"", format, "\": give ", MeshFormatNames()));
+        absl::StrCat("there is no mesh format ", QuotedText(format), ": give ", MeshFormatNames()));
   }
-  const std::optional<std::string> text = Utf8OfUtf16(bytes);
+  const std::optional<std::string> text = PlainText(bytes);
   const std::string& content = text ? *text : bytes;
   ASSIGN_OR_RETURN(NamedMesh named, known->is_surface ? ReadSurface(content, format)
                                                       : ReadElements(content, format));
   Scale(named, metres_per_unit);
+  MoveNear(named);
   return named;
 }
 

@@ -9,10 +9,12 @@
 namespace carillon::precompute {
 
 /// Reads a surface, in the file's unit, and the names of its parts from the bytes of a file.
-/// Coordinates have single precision, because assimp uses it.
+/// Coordinates are rounded to single precision, as files of triangles have them, so that corners
+/// that were written with different digits are one. A body far from the origin is moved near it
+/// first (FarOrigin).
 ///
 /// `format`: "obj", "ply", "stl", "off", or "glb" or "gltf" with all data embedded in the file.
-/// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE.
+/// Errors: MESH_EMPTY, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_TOO_LARGE.
 absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::string& format);
 
 }  // namespace carillon::precompute

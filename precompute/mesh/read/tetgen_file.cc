@@ -96,6 +96,10 @@ class TetgenParser {
                                    "no tetrahedron (\"number nodes [attribute]\")"));
       RETURN_IF_ERROR(AddTetrahedron(figures, node_count));
     }
+    if (!lines_.NextWords().empty()) {
+      return lines_.Unreadable(absl::StrCat("the file goes on after the ", header.front(),
+                                            " tetrahedra that it announced"));
+    }
     return absl::OkStatus();
   }
 

@@ -19,6 +19,12 @@ bool BeginsAsUtf16(std::string_view bytes) {
 
 }  // namespace
 
+std::string_view WithoutByteOrderMark(std::string_view bytes) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (bytes.starts_with(kMark)) bytes.remove_prefix(kMark.size());
+  return bytes;
+}
+
 std::optional<std::string> Utf8OfUtf16(std::string_view bytes) {
   if (!BeginsAsUtf16(bytes)) return std::nullopt;
   // "UTF-16" reads the byte order mark and leaves it out.

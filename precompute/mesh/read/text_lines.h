@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -13,8 +14,11 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "precompute/mesh/surface_mesh.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 
 namespace carillon::precompute {
 
@@ -90,14 +94,37 @@ inline bool NextObjLine(TextLines& lines, std::string& joined) {
 /// not a number.
 template <typename T>
 std::optional<T> ToNumber(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);
+  if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
   T value{};
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error == std::errc::result_out_of_range) {
-    if constexpr (std::is_floating_point_v<T>) return HUGE_VAL;
+    // A number between zero and the least above it is zero.
+    if constexpr (std::is_floating_point_v<T>) {
+      const bool is_small = word.find("e-") != word.npos || word.find("E-") != word.npos;
+      return is_small ? 0 : HUGE_VAL;
+    }
   }
   if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
   return value;
+}
+
+/// Takes the first three of at least three words as a point.
+inline absl::StatusOr<Point> TakePoint(const TextLines& lines,
+                                       std::span<const std::string_view> words) {
+  Point p{};
+  for (size_t x = 0; x < 3; ++x) {
+    const std::optional<double> coordinate = ToNumber<double>(words[x]);
+    if (!coordinate) {
+      return lines.Unreadable(absl::StrCat(QuotedText(words[x]), " is no coordinate"));
+    }
+    if (!std::isfinite(*coordinate)) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "MESH_NOT_FINITE",
+                     absl::StrCat("line ", lines.number(), ": a vertex has the coordinate ",
+                                  QuotedText(words[x]), ": give it finite coordinates"));
+    }
+    p[x] = *coordinate;
+  }
+  return p;
 }
 
 }  // namespace carillon::precompute

@@ -54,16 +54,6 @@ TEST_F(MeshFile, AGltfComesWithTheDataOfItsBuffers) {
   Write("data/of body.bin", "abc");
   const std::string bytes = ReadGltf(Gltf("data/of%20body.bin"));
   EXPECT_THAT(bytes, AllOf(HasSubstr(kAbc), HasSubstr("byteLength"), HasSubstr("2.0")));
-  EXPECT_EQ(ExternalBuffer(bytes), "");
-  EXPECT_EQ(ExternalBuffer(Gltf("data/of%20body.bin")), "data/of%20body.bin");
-}
-
-TEST_F(MeshFile, TheBuffersOfGltf1HaveNames) {
-  Write("body.bin", "abc");
-  const std::string document =
-      R"({"buffers": {"all": {"uri": "body.bin", "type": "arraybuffer"}}})";
-  EXPECT_EQ(ExternalBuffer(document), "body.bin");
-  EXPECT_THAT(ReadGltf(document), HasSubstr(kAbc));
 }
 
 TEST_F(MeshFile, AGltfWithAllDataAndATextThatIsNoneStayAsTheyAre) {

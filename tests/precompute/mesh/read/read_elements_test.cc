@@ -106,10 +106,10 @@ TEST_F(ReadElementsTest, BadInpFilesAreRefusedWithTheLine) {
       {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3\n*STEP\n", "element 1 has too few nodes"},
       {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3", "element 1 has too few nodes"},
       {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,x\n", "line 7: no element"},
-      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,9\n", "MESH_INDEX_OUT_OF_RANGE: tetrahedron 0"},
+      {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,9\n",
+       "MESH_INDEX_OUT_OF_RANGE: element 1 names node 9"},
       {nodes + "*NSET, NSET=a, GENERATE\n1, 1000000000000\n", "line 7: no range of a set"},
       {nodes + "*INCLUDE, INPUT=more.inp\n", "line 6: it has *INCLUDE"},
-      {"*PART, NAME=a\n*END PART\n*PART, NAME=b\n", "line 3: it has a second *PART"},
       {"*NODE, INPUT=more.inp\n", "line 1: it has INPUT="},
       {nodes, "MESH_EMPTY: "},
   };

@@ -76,7 +76,7 @@ TEST_F(ReadGmshTest, AnotherVersionIsRefused) {
   EXPECT_THAT(
       Refused("$MeshFormat\n4 0 8\n$EndMeshFormat\n", "msh"),
       HasSubstr(
-          "MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2 or 4.1: its version is 4"));
+          "MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2 or 4.1: its version is \"4\""));
   EXPECT_THAT(Refused("$MeshFormat\n4.1 1 4\n", "msh"), HasSubstr("numbers have not eight bytes"));
 }
 

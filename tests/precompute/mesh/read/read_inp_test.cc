@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+//
+// What input files of Abaqus and CalculiX can say of nodes and elements: it is computed, or refused
+// by name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "precompute/mesh/point_math.h"
+#include "tests/precompute/mesh/read_mesh_fixture.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+using ReadInpTest = ReadMeshTest;
+
+constexpr char kNodes[] = "*NODE\n1, 0,0,0\n2, 1,0,0\n3, 0,1,0\n4, 0,0,1\n";
+constexpr char kElement[] = "*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1,2,3,4\n";
+
+std::string Part(const std::string& name) {
+  return "*PART, NAME=" + name + "\n" + kNodes + kElement + "*NSET, NSET=tip\n4\n*END PART\n";
+}
+
+/// The nodes of the only tetrahedron.
+void ExpectNodes(const TetMesh& mesh, const std::vector<Point>& nodes) {
+  ASSERT_EQ(mesh.nodes.size(), nodes.size());
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    EXPECT_LT(Distance(mesh.nodes[n], nodes[n]), 1e-12) << n;
+  }
+}
+
+TEST_F(ReadInpTest, NumbersAreReadAsFortranWritesThem) {
+  const TetMesh mesh = ReadTetsOf(
+      std::string("*NODE\n1, -0., .0, 0.D0\n2, +1.D-3, 0, 0\n3, 0, 1-3,\n4, 0., , 1.0E-03\n") +
+          kElement,
+      "inp");
+  ExpectNodes(mesh, {{0, 0, 0}, {1e-3, 0, 0}, {0, 1e-3, 0}, {0, 0, 1e-3}});
+}
+
+TEST_F(ReadInpTest, CylindricalNodesAndLocalSystemsArePlaced) {
+  ExpectNodes(
+      ReadTetsOf(
+          std::string("*NODE, SYSTEM=C\n1, 0,0,0\n2, 1,0,0\n3, 1,90.,0\n4, 0,0,1\n") + kElement,
+          "inp"),
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+  // The first axis points along y, the second along -x.
+  ExpectNodes(
+      ReadTetsOf(std::string("*SYSTEM\n5., 6., 7., 5., 9., 7.\n4., 6., 7.\n") + kNodes + kElement,
+                 "inp"),
+      {{5, 6, 7}, {5, 7, 7}, {4, 6, 7}, {5, 6, 8}});
+}
+
+TEST_F(ReadInpTest, AnInstanceIsMovedAndThenTurned) {
+  const TetMesh mesh =
+      ReadTetsOf(Part("Bar") +
+                     "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B, PART=bar\n 1., 0., 0.\n"
+                     " 0., 0., 0., 0., 0., 1., 90.\n*END INSTANCE\n*END ASSEMBLY\n",
+                 "inp");
+  ExpectNodes(mesh, {{0, 1, 0}, {0, 2, 0}, {-1, 1, 0}, {0, 1, 1}});
+}
+
+// CAE numbers a reference point of the assembly from 1, as it does the nodes of each part.
+TEST_F(ReadInpTest, NodesOfTheAssemblyAreNotThoseOfTheParts) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      Part("Bar") +
+          "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B-1, PART=Bar\n*END INSTANCE\n*NODE\n1, 9,9,9\n"
+          "*NSET, NSET=held, INSTANCE=B-1\n2, 3\n*NSET, NSET=mixed\nB-1.tip, B-1.1\n"
+          "*NSET, NSET=tip, INSTANCE=B-1\n1\n*END ASSEMBLY\n",
+      "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  ExpectNodes(std::get<TetMesh>(read->mesh), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+  std::vector<std::string> names;
+  for (const MeshGroup& group : read->names.groups) names.push_back(group.name);
+  EXPECT_THAT(names, ElementsAre("all", "B-1.tip", "held", "mixed", "tip"));
+  EXPECT_THAT(read->names.groups[2].simplices,
+              ElementsAre(std::array{1, -1, -1, -1}, std::array{2, -1, -1, -1}));
+  EXPECT_EQ(read->names.groups[3].simplices.size(), 2U);
+  EXPECT_THAT(read->warnings, IsEmpty());
+}
+
+TEST_F(ReadInpTest, TwoInstancesAreTwoBodies) {
+  EXPECT_THAT(
+      Refused(Part("Bar") + "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B-1, PART=Bar\n*END INSTANCE\n"
+                            "*INSTANCE, NAME=B-2, PART=Bar\n0., 0., 5.\n*END INSTANCE\n"
+                            "*END ASSEMBLY\n",
+              "inp"),
+      HasSubstr("MESH_SEVERAL_PIECES: only 1 of 2 tetrahedra"));
+}
+
+TEST_F(ReadInpTest, APartThatNoInstancePlacesIsNotThere) {
+  const TetMesh mesh = ReadTetsOf(Part("Bar") + Part("Tool") +
+                                      "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B, PART=Tool\n"
+                                      "*END INSTANCE\n*END ASSEMBLY\n",
+                                  "inp");
+  EXPECT_EQ(mesh.element_count(), 1U);
+}
+
+TEST_F(ReadInpTest, ASetMayComeBeforeItsElements) {
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed(std::string("*ELSET, ELSET=\"a, b\"\n1,\n") + kNodes + kElement, "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->names.groups[0].name, "a, b");
+  EXPECT_EQ(read->names.groups[0].simplices.size(), 1U);
+}
+
+TEST_F(ReadInpTest, ConditionsThatAreNotUsedAreNamed) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      std::string(kNodes) + kElement + "*BOUNDARY\n1, 1, 3\n*STEP\n*BOUNDARY\n2, 1\n", "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->warnings, ElementsAre(HasSubstr("*BOUNDARY of the file (line 8)")));
+}
+
+TEST_F(ReadInpTest, WhatIsNotReadIsRefusedByName) {
+  const std::string flat = std::string(kNodes) + kElement;
+  const std::vector<std::pair<std::string, const char*>> cases = {
+      {"*NODE, SYSTEM=S\n1, 0,0,0\n", "line 1: it has *NODE, SYSTEM=S"},
+      {flat + "*NGEN\n1, 2\n", "line 8: it has *NGEN"},
+      {flat + "*End  Part\n*Ncopy, change number=10\n", "it has *NCOPY"},
+      {flat + "*NODE\n1, 5,5,5\n", "line 9: node 1 is there twice, at different places"},
+      {flat + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n", "line 9: element 1 is there twice"},
+      {flat + "*ELEMENT, TYPE=B31\n2, 1,2\n",
+       "MESH_ELEMENT_UNSUPPORTED: the file has elements of type B31 (line 8)"},
+      {flat + "*SOLID SECTION, ELSET=a, MATERIAL=steel\n*SOLID SECTION, ELSET=b, MATERIAL=ash\n",
+       "MESH_ELEMENT_UNSUPPORTED: the file has sections of 2 materials, \"ASH\" and \"STEEL\""},
+      {"*INSTANCE, NAME=a, PART=none\n", "an instance of the part \"none\", which is not there"},
+      {flat + "*SYSTEM\n0,0,0, 1,0,0\n2,0,0\n", "no points of *SYSTEM, or they lie on one line"},
+  };
+  for (const auto& [file, message] : cases) {
+    EXPECT_THAT(Refused(file, "inp"), HasSubstr(message)) << file;
+  }
+}
+
+TEST_F(ReadInpTest, ANodeThatIsThereTwiceAtOnePlaceIsOneNode) {
+  EXPECT_EQ(ReadTetsOf(std::string(kNodes) + "*NODE, NSET=again\n1, 0., 0., 0.\n" + kElement, "inp")
+                .nodes.size(),
+            4U);
+}
+
+TEST_F(ReadInpTest, ShellsBesideTheTetrahedraAreNamed) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      std::string(kNodes) + "5, 9,9,9\n" + kElement + "*ELEMENT, TYPE=S3\n2, 1,2,3\n3, 1,2,5\n",
+      "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->warnings, ElementsAre(HasSubstr("1 triangles of the file have nodes")));
+}
+
+}  // namespace
+}  // namespace carillon::precompute
