@@ -7,12 +7,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_format.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
+#include "precompute/mesh/surface/nearest_triangle.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -143,6 +146,28 @@ absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wal
   }
   return Impossible(absl::StrFormat("a wall of %g m could not be made: %s", wall_m,
                                     std::string(unsound.message())));
+}
+
+bool HasTwoSides(const SurfaceMesh& surface, double distance_m) {
+  constexpr int kSampleCount = 400;
+  const double least_m = 1e-6 * Diagonal(surface.vertices);
+  std::vector<double> area;
+  for (size_t t = 0; t < surface.triangles.size(); ++t) {
+    area.push_back(Norm(AreaNormal(CornersOf(surface, t))));
+  }
+  if (!(std::accumulate(area.begin(), area.end(), 0.0) > 0)) return false;
+  const NearestTriangle index(surface);
+  std::mt19937 random(1);
+  std::discrete_distribution<size_t> pick(area.begin(), area.end());
+  int count = 0;
+  for (int i = 0; i < kSampleCount; ++i) {
+    const auto corners = CornersOf(surface, pick(random));
+    const Point normal = AreaNormal(corners), middle = MiddleOf(corners);
+    const Point back = {-normal[0], -normal[1], -normal[2]};
+    count += index.DistanceAlong(middle, normal, least_m) <= distance_m ||
+             index.DistanceAlong(middle, back, least_m) <= distance_m;
+  }
+  return count > kSampleCount / 2;
 }
 
 absl::StatusOr<RepairedSurface> Thicken(const SurfaceMesh& sheet, double wall_m) {

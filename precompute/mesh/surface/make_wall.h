@@ -15,6 +15,10 @@ namespace carillon::precompute {
 /// is too thin compared with the body.
 absl::StatusOr<RepairedSurface> HollowOut(const SurfaceMesh& surface, double wall_m);
 
+/// Returns whether a surface has two sides like a wall: whether more than half of its area has
+/// another part of the surface, in front of it or behind it, within `distance_m`.
+bool HasTwoSides(const SurfaceMesh& surface, double distance_m);
+
 /// Thickens an open sheet, which may be any soup of triangles, to `wall_m`: the result is the
 /// isosurface of the distance at half of that thickness.
 ///

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
@@ -78,45 +79,70 @@ absl::StatusOr<Warnings> RepairWithoutWrapping(RepairedSurface& repaired) {
 /// for a wrap: twice the width that the wrap closes, because a slit has twice its width.
 constexpr double kWideHolePart = 2 * kWrappedHolePart;
 
-absl::Status WideHole(double width_m, double diagonal_m) {
+/// A surface with an opposite side within this many thicknesses is a wall already, and must not get
+/// another one on each side.
+constexpr double kOppositeWalls = 2.5;
+/// Part of the diagonal that a refusal advises as the thickness of a wall.
+constexpr double kAdvisedWallPart = 0.02;
+
+bool IsWallAlready(const SurfaceMesh& surface) {
+  return HasTwoSides(surface, kOppositeWalls * kAdvisedWallPart * Diagonal(surface.vertices));
+}
+
+/// The last words of a refusal of a hole.
+const char* ClosingAdvice(const SurfaceMesh& surface) {
+  return IsWallAlready(surface)
+             ? "close the hole (the surface has both sides of its wall already, and needs no "
+               "--wall)"
+             : "close the hole, or, if the surface is a thin wall, give it a thickness (--wall)";
+}
+
+absl::Status WideHole(double width_m, const SurfaceMesh& surface) {
+  const double diagonal_m = Diagonal(surface.vertices);
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MESH_NOT_CLOSED",
       absl::StrFormat(
           "the surface has a hole about %.3g m wide, which repair does not close: it fills holes "
-          "in "
-          "flat faces, other holes whose rim is shorter than %.3g m if all of them have at most a "
-          "twentieth of the area, and by wrapping those narrower than %.3g m; close the hole, or, "
-          "if "
-          "the surface is a thin wall, give it a thickness (--wall)",
-          width_m, diagonal_m, kWrappedHolePart * diagonal_m));
+          "in flat faces, other holes whose rim is shorter than %.3g m if all of them have at most "
+          "a twentieth of the area, and by wrapping those narrower than %.3g m; %s",
+          width_m, diagonal_m, kWrappedHolePart * diagonal_m, ClosingAdvice(surface)));
 }
 
 /// Returns a refusal if the surface, repaired but for wrapping, has a hole that a wrap would enter.
 absl::Status CheckHoles(const absl::Status& sound, const SurfaceMesh& surface) {
   if (!Is(sound, "MESH_NOT_CLOSED")) return absl::OkStatus();
-  const double width_m = WidestHole(surface), diagonal_m = Diagonal(surface.vertices);
-  if (width_m <= kWideHolePart * diagonal_m) return absl::OkStatus();
-  return WideHole(width_m, diagonal_m);
+  const double width_m = WidestHole(surface);
+  if (width_m <= kWideHolePart * Diagonal(surface.vertices)) return absl::OkStatus();
+  return WideHole(width_m, surface);
+}
+
+/// Repairs a surface without changing its shape. If corners that lie close together leave it open,
+/// they are joined, provided that this makes it sound.
+RepairedSurface RepairInPlace(const SurfaceMesh& given) {
+  RepairedSurface repaired = RepairSoup(given);
+  if (CheckSurface(repaired.surface).ok()) return repaired;
+  RepairedSurface joined = RepairSoup(given, JoinDistance(given));
+  return CheckSurface(joined.surface).ok() ? std::move(joined) : std::move(repaired);
 }
 
 /// Adds figures to the refusal of an open surface, from which remedies follow: whether repair can
 /// close it, and whether it is a solid body that lacks parts of flat faces rather than a thin wall.
 absl::Status WithRemediesOfHoles(absl::Status refusal, const SurfaceMesh& given) {
   if (!Is(refusal, "MESH_NOT_CLOSED")) return refusal;
-  RepairedSurface repaired = RepairSoup(given);
+  RepairedSurface repaired = RepairInPlace(given);
   const auto flat = CloseFlatFaces(repaired.surface);
   const bool lacks_flat_parts = flat && CheckSurface(flat->surface).ok();
   const bool repair_helps =
       lacks_flat_parts ||
       CheckHoles(RepairWithoutWrapping(repaired).status(), repaired.surface).ok();
   AddFigure(refusal, "repair_helps", repair_helps ? "1" : "0");
-  AddFigure(refusal, "wall_helps", lacks_flat_parts ? "0" : "1");
+  AddFigure(refusal, "wall_helps", lacks_flat_parts || IsWallAlready(given) ? "0" : "1");
   return refusal;
 }
 
 /// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
 absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
-  RepairedSurface repaired = RepairSoup(given);
+  RepairedSurface repaired = RepairInPlace(given);
   const absl::StatusOr<Warnings> sound = RepairWithoutWrapping(repaired);
   if (sound.ok()) {
     AddTo(warnings, repaired.remarks);
@@ -131,9 +157,28 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
   return std::move(wrapped.surface);
 }
 
+/// Returns the refusal of a failed repair, which also says what was to be repaired.
+absl::Status WithFirstFault(const absl::Status& failed, const absl::Status& as_given) {
+  if (failed.message() == as_given.message()) return failed;
+  v1::ErrorInfo error = ToErrorInfo(failed);
+  error.set_message(absl::StrCat(
+      error.message(), ". As given, the surface has another fault: ", as_given.message()));
+  (*error.mutable_metadata())["given_reason"] = ToErrorInfo(as_given).reason();
+  return FromErrorInfo(failed.code(), error);
+}
+
 absl::StatusOr<RepairedSurface> WithWall(const SurfaceMesh& surface, const absl::Status& sound,
                                          double wall_m) {
   if (sound.ok()) return HollowOut(surface, wall_m);
+  if (HasTwoSides(surface, kOppositeWalls * wall_m)) {
+    return WithRemediesOfHoles(
+        Refusal(absl::StatusCode::kInvalidArgument, "MESH_NOT_CLOSED",
+                absl::StrFormat("the surface is open, and has both sides of its wall already: most "
+                                "of it has an opposite side within %.3g m. A wall of %g m on each "
+                                "side would make it too heavy: close its holes, without --wall",
+                                kOppositeWalls * wall_m, wall_m)),
+        surface);
+  }
   absl::StatusOr<RepairedSurface> thickened = Thicken(surface, wall_m);
   if (thickened.ok()) return thickened;
   absl::Status refusal = thickened.status();
@@ -153,7 +198,7 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   // An open sheet that is to get a wall needs no repair.
   if (!sound.ok() && settings.repair && !(settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED"))) {
     absl::StatusOr<SurfaceMesh> repaired = Repair(given, prepared.warnings);
-    sound = repaired.status();
+    sound = repaired.ok() ? absl::OkStatus() : WithFirstFault(repaired.status(), sound);
     if (repaired.ok()) {
       prepared.surface = *std::move(repaired);
       prepared.warnings.emplace_back(

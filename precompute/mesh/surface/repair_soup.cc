@@ -11,6 +11,7 @@
 #include "absl/container/flat_hash_map.h"
 #include "absl/container/flat_hash_set.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/surface_shells.h"
 
@@ -98,6 +99,38 @@ EdgeTriangles TrianglesAtEdges(const SurfaceMesh& surface) {
     for (size_t i = 0; i < 3; ++i) edges[Undirected(c[i], c[(i + 1) % 3])].push_back(t);
   }
   return edges;
+}
+
+/// The vertices of edges that only one triangle has.
+absl::flat_hash_set<int32_t> BorderVertices(const SurfaceMesh& surface) {
+  absl::flat_hash_set<int32_t> border;
+  for (const auto& [edge, triangles] : TrianglesAtEdges(surface)) {
+    if (triangles.size() == 1) border.insert({edge.first, edge.second});
+  }
+  return border;
+}
+
+/// Joins vertices of the border that lie within `join_m`. Returns how many are gone.
+size_t JoinBorders(SurfaceMesh& surface, double join_m) {
+  const absl::flat_hash_set<int32_t> border = BorderVertices(surface);
+  std::vector<int32_t> ordered(border.begin(), border.end());
+  std::ranges::sort(ordered);
+  Welder welder(join_m);
+  std::vector<Point> joined;
+  std::vector<int32_t> first_of;  // the vertex of the surface that each joined one is
+  absl::flat_hash_map<int32_t, int32_t> replacement;
+  for (const int32_t v : ordered) {
+    const int32_t j = welder.Weld(surface.vertices[static_cast<size_t>(v)], joined);
+    if (static_cast<size_t>(j) == first_of.size()) first_of.push_back(v);
+    if (first_of[static_cast<size_t>(j)] != v) replacement[v] = first_of[static_cast<size_t>(j)];
+  }
+  for (Triangle& triangle : surface.triangles) {
+    for (int32_t& v : triangle) {
+      const auto found = replacement.find(v);
+      if (found != replacement.end()) v = found->second;
+    }
+  }
+  return replacement.size();
 }
 
 /// Where along a to b a point lies, 0 to 1, if within `tolerance` of it and not at an end.
@@ -272,17 +305,35 @@ bool Closed(const SurfaceMesh& surface) {
 
 }  // namespace
 
-RepairedSurface RepairSoup(const SurfaceMesh& given) {
+double JoinDistance(const SurfaceMesh& given) {
+  constexpr double kPartOfEdge = 0.1, kPartOfDiagonal = 1e-3;
+  const double diagonal = Diagonal(given.vertices);
+  double shortest = diagonal;
+  for (size_t t = 0; t < given.triangles.size(); ++t) {
+    const auto corners = CornersOf(given, t);
+    for (size_t i = 0; i < 3; ++i) {
+      const double length = Distance(corners[i], corners[(i + 1) % 3]);
+      if (length > kWeldPart * diagonal) shortest = std::min(shortest, length);
+    }
+  }
+  return std::min(kPartOfEdge * shortest, kPartOfDiagonal * diagonal);
+}
+
+RepairedSurface RepairSoup(const SurfaceMesh& given, double join_m) {
   RepairedSurface repaired;
   const auto remark = [&](size_t count, absl::string_view what) {
     if (count > 0) repaired.remarks.push_back(absl::StrCat("repaired: ", count, " ", what));
   };
   const double diagonal = given.vertices.empty() ? 0 : Diagonal(given.vertices);
   if (!(diagonal > 0)) return {given, {}};
-  const double tolerance = kWeldPart * diagonal;
+  const double tolerance = std::max(kWeldPart * diagonal, join_m);
   SurfaceMesh& surface = repaired.surface;
-  surface = Weld(given, tolerance);
+  surface = Weld(given, kWeldPart * diagonal);
   remark(given.vertices.size() - surface.vertices.size(), "vertices joined with others");
+  if (join_m > 0) {
+    remark(JoinBorders(surface, join_m),
+           absl::StrFormat("corners of open edges joined with others up to %.3g m away", join_m));
+  }
   remark(DropCollapsed(surface), "triangles without extent dropped");
   remark(DropDuplicates(surface), "triangles dropped that lay on others");
   size_t cut = 0;

@@ -18,6 +18,13 @@ struct RepairedSurface {
 /// diagonal, drops triangles without area and duplicates, closes the seams and T-junctions that
 /// this leaves, closes holes with a rim shorter than a fifth of the diagonal, and orients triangles
 /// consistently and outward. The result may still have defects, which CheckSurface finds.
-RepairedSurface RepairSoup(const SurfaceMesh& given);
+///
+/// `join_m`: if above zero, corners of open edges that lie within this distance, m, are joined,
+/// too.
+RepairedSurface RepairSoup(const SurfaceMesh& given, double join_m = 0);
+
+/// Returns the distance, m, within which corners of open edges are taken for one corner that was
+/// written several times: a tenth of the shortest edge, but at most a thousandth of the diagonal.
+double JoinDistance(const SurfaceMesh& given);
 
 }  // namespace carillon::precompute

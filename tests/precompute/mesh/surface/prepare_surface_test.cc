@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <random>
+#include <utility>
 
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
@@ -15,11 +18,13 @@
 #include "precompute/mesh/surface/repair_soup.h"
 #include "precompute/mesh/surface/surface_shells.h"
 #include "precompute/mesh/surface/wrap_surface.h"
+#include "proto/cpp/error_reason.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr double kPi = std::numbers::pi;
@@ -198,6 +203,91 @@ TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {
     moved += std::ranges::count(untangled->surface.vertices, p) == 0 ? 1 : 0;
   }
   EXPECT_EQ(moved, 0);
+}
+
+/// A box whose triangles do not share corners: each corner is moved by up to `apart_m`.
+SurfaceMesh LooseBox(double apart_m) {
+  const SurfaceMesh box = MakeBoxSurface({0.2, 0.03, 0.02});
+  SurfaceMesh loose;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> part(-apart_m, apart_m);
+  for (const auto& triangle : box.triangles) {
+    auto& corners = loose.triangles.emplace_back();
+    for (size_t i = 0; i < 3; ++i) {
+      Point p = box.vertices[static_cast<size_t>(triangle[i])];
+      for (double& x : p) x += part(random);
+      corners[i] = static_cast<int32_t>(loose.vertices.size());
+      loose.vertices.push_back(p);
+    }
+  }
+  return loose;
+}
+
+TEST(PrepareSurface, CornersThatLieCloseTogetherAreJoinedBeforeAWrap) {
+  for (const double apart_m : {2e-7, 3e-5}) {
+    const auto joined = PrepareSurface(LooseBox(apart_m), {.repair = true});
+    ASSERT_TRUE(joined.ok()) << joined.status();
+    EXPECT_EQ(joined->surface.triangles.size(), 12U) << apart_m;
+    EXPECT_NEAR(EnclosedVolume(joined->surface), 1.2e-4, 1e-2 * 1.2e-4);
+  }
+}
+
+/// A cup of 0.1 m with a wall of 4 mm: an outer and an inner surface, closed at the rim, and a hole
+/// through both.
+SurfaceMesh CupWithAHole() {
+  const auto cup = [](double radius_m, double from_m, bool outward) {
+    SurfaceMesh side;
+    constexpr int kAround = 48, kAlong = 12;
+    for (int k = 0; k <= kAlong; ++k) {
+      for (int i = 0; i < kAround; ++i) {
+        const double angle = 2 * kPi * i / kAround;
+        side.vertices.push_back({radius_m * std::cos(angle), radius_m * std::sin(angle),
+                                 from_m + (0.1 - from_m) * k / kAlong});
+      }
+    }
+    for (int k = 0; k < kAlong; ++k) {
+      for (int i = 0; i < kAround; ++i) {
+        const int next = (i + 1) % kAround;
+        const int32_t a = k * kAround + i, b = k * kAround + next;
+        const int32_t c = a + kAround, d = b + kAround;
+        if (k >= 5 && k < 7 && i < 4) continue;  // the hole
+        side.triangles.push_back({a, b, d});
+        side.triangles.push_back({a, d, c});
+      }
+    }
+    const auto middle = static_cast<int32_t>(side.vertices.size());
+    side.vertices.push_back({0, 0, from_m});
+    for (int32_t i = 0; i < kAround; ++i) side.triangles.push_back({middle, (i + 1) % kAround, i});
+    for (auto& triangle : side.triangles) {
+      if (!outward) std::swap(triangle[0], triangle[1]);
+    }
+    return side;
+  };
+  SurfaceMesh both = cup(0.05, 0, true);
+  AddShell(both, cup(0.046, 0.004, false), {0, 0, 0});
+  return both;
+}
+
+TEST(PrepareSurface, AWallIsNotAdvisedAndRefusedWhereTheSurfaceHasTwoSides) {
+  const SurfaceMesh cup = CupWithAHole();
+  const absl::Status open = PrepareSurface(cup, {}).status();
+  EXPECT_THAT(open.ToString(), HasSubstr("MESH_NOT_CLOSED"));
+  EXPECT_EQ(ToErrorInfo(open).metadata().at("wall_helps"), "0");
+  EXPECT_THAT(PrepareSurface(cup, {.wall_m = 0.0028}).status().ToString(),
+              HasSubstr("has both sides of its wall already"));
+}
+
+TEST(PrepareSurface, AFailedRepairNamesTheFirstFaultToo) {
+  SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
+  std::erase_if(cup.triangles, [&](const auto& triangle) {
+    return std::ranges::all_of(
+        triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
+  });
+  cup.triangles.push_back(cup.triangles[0]);
+  const absl::Status failed = PrepareSurface(cup, {.repair = true}).status();
+  EXPECT_THAT(failed.ToString(),
+              AllOf(HasSubstr("MESH_NOT_CLOSED"), HasSubstr("MESH_DUPLICATE_SHELL: ")));
+  EXPECT_EQ(ToErrorInfo(failed).metadata().at("given_reason"), "MESH_DUPLICATE_SHELL");
 }
 
 TEST(PrepareSurface, BodiesApartAreNotJoined) {
