@@ -210,7 +210,7 @@ absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job,
 bool HelpsToRepair(const v1::Remedy& remedy) { return remedy.field() == "settings.mesh.repair"; }
 
 /// Waits for the job of one file. A surface that is refused, and that repair may help, is asked for
-/// again with repair; where that fails, too, the first refusal is returned.
+/// again with repair; where that fails, too, its refusal is returned, which also names the first.
 absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateModelOptions& options,
                                    const std::string& file, const std::string& job) {
   absl::StatusOr<v1::Job> ended = WatchWithProgress(daemon, job);
@@ -222,7 +222,7 @@ absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateMod
   repairing.settings.mutable_mesh()->set_repair(true);
   absl::StatusOr<v1::Job> repaired = RequestModel(daemon, repairing, file);
   if (repaired.ok()) repaired = WatchWithProgress(daemon, repaired->name());
-  return repaired.ok() ? repaired : ended;
+  return repaired;
 }
 
 /// Prints how a user sees whether a job that nobody waits for fails.

@@ -54,6 +54,21 @@ struct Fillable {
   MeshNames names;
 };
 
+/// Warns if the mesh has many more corner nodes than were asked for, because the surface forces
+/// them.
+void WarnOfMoreNodes(int asked, const TetMesh& mesh, std::vector<std::string>& warnings) {
+  constexpr double kMany = 1.5;
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  std::vector<bool> is_corner(mesh.nodes.size(), false);
+  for (size_t i = 0; i < mesh.elements.size(); ++i) {
+    if (i % stride < 4) is_corner[static_cast<size_t>(mesh.elements[i])] = true;
+  }
+  const auto corner_count = std::ranges::count(is_corner, true);
+  if (asked == 0 || static_cast<double>(corner_count) <= kMany * asked) return;
+  warnings.push_back(absl::StrCat("the mesh has ", corner_count, " corner nodes, not the ", asked,
+                                  " asked for (--nodes), because the surface forces them"));
+}
+
 absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing,
                                  const v1::WorkerRequest& request) {
   ASSIGN_OR_RETURN(TetMesh mesh, Tetrahedralize(surface.prepared.surface, meshing));
@@ -61,7 +76,10 @@ absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings&
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), surface.given, surface.names, mesh));
-  return Body{surface.given, std::move(mesh), surface.prepared.warnings,
+  std::vector<std::string> warnings = surface.prepared.warnings;
+  const int asked = static_cast<int>(request.settings().mesh().target_node_count());
+  if (meshing.target_node_count == asked) WarnOfMoreNodes(asked, mesh, warnings);
+  return Body{surface.given, std::move(mesh), std::move(warnings),
               surface.prepared.frequency_error};
 }
 
@@ -114,10 +132,14 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
   const v1::DecompositionSettings& settings = request.settings();
   ASSIGN_OR_RETURN(NamedMesh read,
                    ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
-  observer.OnExtent(UseOf(request).size * ExtentOf(read.mesh));
+  const double extent_m = ExtentOf(read.mesh);
+  observer.OnExtent(UseOf(request).size * extent_m);
+  RETURN_IF_ERROR(CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request)));
   observer.OnProgress(v1::PHASE_MESH, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
-    return TakeTetrahedra(std::move(*tetrahedra), read.names, request);
+    ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names, request));
+    body.warnings = std::move(read.warnings);
+    return body;
   }
   auto& given = std::get<SurfaceMesh>(read.mesh);
   absl::StatusOr<PreparedSurface> prepared =
@@ -126,6 +148,7 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
                              .coarsen = MayCoarsen(request),
                              .most_triangles = 2 * settings.mesh().target_node_count()});
   if (!prepared.ok()) return WithExtent(prepared.status(), given);
+  std::ranges::move(read.warnings, std::back_inserter(prepared->warnings));
   return Fillable{std::move(given), *std::move(prepared), std::move(read.names)};
 }
 

@@ -24,6 +24,22 @@ constexpr double kFirstOfCompactHz = 1;
 
 }  // namespace
 
+absl::Status CheckUnit(double extent_m, double metres_per_unit, const IntendedUse& use) {
+  constexpr double kLongBodyM = 50, kMostWavelengths = 100;
+  const double speed_m_per_s = std::sqrt(use.young_pa / use.density_kg_per_m3);
+  const double highest_hz = kMostWavelengths * speed_m_per_s / extent_m;
+  if (metres_per_unit != 1 || use.size != 1 || extent_m <= kLongBodyM ||
+      use.high_hz <= highest_hz) {
+    return absl::OkStatus();
+  }
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "MESH_UNIT_UNCLEAR",
+      absl::StrFormat("the body is %.4g m long if the file's unit is the metre: give the unit of "
+                      "the file (--unit mm), or, if the body is so large, a band up to at most "
+                      "%.3g Hz",
+                      extent_m, highest_hz));
+}
+
 bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use) {
   const double diagonal_m = Diagonal(surface.vertices);
   double volume_m3 = 0;

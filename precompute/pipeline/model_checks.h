@@ -8,6 +8,11 @@
 
 namespace carillon::precompute {
 
+/// Refuses a body that is so long that its unit was probably forgotten, before hours are spent on
+/// it: longer than 50 m and than a hundred wavelengths of the band's upper end, in a file whose
+/// lengths are read as metres. Errors: MESH_UNIT_UNCLEAR.
+absl::Status CheckUnit(double extent_m, double metres_per_unit, const IntendedUse& use);
+
 /// Returns whether a body may be too small to have a mode in the band, and is so compact that its
 /// default mesh takes long.
 bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use);

@@ -179,6 +179,10 @@ constexpr Known kMetres{"settings.metres_per_unit", "--unit", "reads the file's 
                           return unit_m == 0 || unit_m == 1;
                         }};
 
+constexpr Known kMillimetres{"settings.metres_per_unit", "--unit",
+                             "reads the file's lengths as millimetres",
+                             [](const Refused&) -> std::string { return "0.001"; }, Never};
+
 std::vector<Known> RemediesOf(const std::string& reason) {
   if (reason == "MESH_NOT_CLOSED") return {kRepair, kWall};
   for (const char* faulty :
@@ -187,6 +191,7 @@ std::vector<Known> RemediesOf(const std::string& reason) {
     if (reason == faulty) return {kRepair};
   }
   if (reason == "MESH_REPAIR_FAILED") return {kWall};
+  if (reason == "MESH_UNIT_UNCLEAR") return {kMillimetres};
   if (reason == "MESH_WALL_IMPOSSIBLE") return {kThinnerWall, kSolid};
   if (reason == "MESH_TETRAHEDRALIZATION_FAILED") return {kNodes, kRepair};
   if (reason == "TOO_MANY_MODES") return {kOpenBand, kKeep, kCountedBand};

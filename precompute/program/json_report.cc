@@ -16,6 +16,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// Bytes that are not UTF-8, as in the name of a file, are replaced.
+std::string Text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
 /// Largest resident size so far of this process or of a child of it.
 int64_t PeakMemoryBytes() {
   rusage own{};
@@ -160,7 +165,7 @@ std::string JsonReport(const ModalModel& model, const Transfer* transfer, const 
                  {"modes", ModesInBand(model, transfer, use)}};
   if (model.comparison) report["check"] = Check(*model.comparison);
   if (transfer != nullptr) report["radiation"] = RadiationSummary(*transfer);
-  return report.dump(2);
+  return Text(report);
 }
 
 std::string JsonError(const absl::Status& status) {
@@ -173,7 +178,7 @@ std::string JsonError(const absl::Status& status) {
                                   {"option", remedy.option()},
                                   {"effect", remedy.effect()}});
   }
-  return Json{{"error", object}}.dump(2);
+  return Text({{"error", object}});
 }
 
 }  // namespace carillon::precompute

@@ -28,7 +28,7 @@ TEST_F(ProgramFindingsTest, AMeshOfFewElementsIsComparedWithAFinerOne) {
   const Json fine = Json::parse(Run(options).output).at("modes");
   for (const char* few : {" --keep-surface", " --nodes 3", " --nodes 60"}) {
     const Json report = Json::parse(Run(options + few).output);
-    EXPECT_THAT(report.at("warnings").at(0).get<std::string>(), HasSubstr("too few elements"));
+    EXPECT_THAT(report.at("warnings").dump(), HasSubstr("too few elements"));
     const Json& modes = report.at("modes");
     ASSERT_LT(modes.size(), fine.size());
     for (size_t m = 0; m < modes.size(); ++m) {
@@ -109,6 +109,27 @@ TEST_F(ProgramFindingsTest, NodesBesideAnAccuracyAreToldToBeThoseOfTheFirstMesh)
       Run(bar + " --out " + model + " --unit mm --nodes 300 --accuracy 10%" + kSteel).exit_status,
       0);
   EXPECT_THAT(OnStandardError(), HasSubstr("the 300 nodes asked for"));
+}
+
+TEST_F(ProgramFindingsTest, FewerNodesThanTheSurfaceForcesAreToldSo) {
+  ASSERT_EQ(Run(bar + " --out " + model + " --unit mm --nodes 3" + kSteel).exit_status, 0);
+  EXPECT_THAT(OnStandardError(), HasSubstr("corner nodes, not the 3 asked for"));
+}
+
+TEST_F(ProgramFindingsTest, ABodyOfAHundredMetresAsksForItsUnit) {
+  const std::string options = bar + " --out " + model + " --json" + kSteel;
+  const Result result = Run(options);
+  EXPECT_EQ(ReasonOf(result), "MESH_UNIT_UNCLEAR");
+  const Json remedy = Json::parse(result.output).at("error").at("remedies").at(0);
+  EXPECT_EQ(remedy.at("option"), "--unit");
+  EXPECT_EQ(
+      Run(options + " --nodes 100 --unit " + remedy.at("value").get<std::string>()).exit_status, 0);
+}
+
+TEST_F(ProgramFindingsTest, WordsThatAreNoUtf8AreReportedAsJson) {
+  std::ofstream(bar, std::ios::trunc) << "v 1 2 3\nv caf\xe9 0 0\nf 1 1 1\n";
+  EXPECT_EQ(ReasonOf(RunBar(kSteel)), "MESH_UNREADABLE");
+  EXPECT_THAT(OnStandardError(), HasSubstr("line 2: \"caf\\xe9\" is no coordinate"));
 }
 
 TEST_F(ProgramFindingsTest, OnlyRemediesThatHelpAnOpenSurfaceAreOffered) {

@@ -7,7 +7,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/block_broadcast.h"
-#include "server/base/usable_memory.h"
+#include "server/base/physical_memory.h"
 #include "server/scene/scene_registry.h"
 #include "server/synthesis/mixer.h"
 
@@ -49,8 +49,7 @@ Bound BoundOf(Holding holding) {
 
 size_t MostRenderingMib() {
   constexpr uint64_t kMost = 2048;
-  static const auto most = static_cast<size_t>(std::min(kMost, (UsableMemoryBytes() / 4) >> 20U));
-  return most;
+  return static_cast<size_t>(std::min(kMost, (PhysicalBytes() / 4) >> 20U));
 }
 
 ClientPlace::~ClientPlace() {

@@ -37,8 +37,8 @@ inline constexpr size_t kHoldingCount = 8;
 /// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
 
-/// Returns the memory that all renderings together may hold: a quarter of what the daemon may use
-/// (UsableMemoryBytes), but at most 2 GiB.
+/// Returns the memory that all renderings together may hold: a quarter of the machine's, but at
+/// most 2 GiB.
 size_t MostRenderingMib();
 
 /// Greatest number of uploads of meshes and imports of models at a time.
