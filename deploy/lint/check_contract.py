@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lints proto/ with buf, and checks it for changes that would break clients in the field.
 
-It is compared with how it was at the newest release (a tag v*), or, before the first, with how it was
-before the newest commit that touched it. Without that history only the lint is done.
+It is compared with how it was at the newest release (a tag v*). Before the first release no client depends on it,
+and only the lint is done.
 """
 
 import io
@@ -14,8 +14,6 @@ import tarfile
 import tempfile
 
 import project
-
-CONTRACT = "proto/carillon"
 
 
 def buf(root, *arguments):
@@ -37,22 +35,19 @@ def git(root, *arguments):
     return result.stdout if result.returncode == 0 else None
 
 
-def baseline(root):
-    """The commit to compare with; None where there is none."""
+def newest_release(root):
+    """The tag of the newest release; None where there is none."""
     if not (root / ".git").exists():
         return None
-    if tag := git(root, "describe", "--tags", "--abbrev=0", "--match", "v*"):
-        return tag.decode().strip()
-    newest = (git(root, "rev-list", "--max-count=1", "HEAD", "--", CONTRACT) or b"").decode().strip()
-    before = git(root, "rev-parse", "--verify", "--quiet", f"{newest}^") if newest else None
-    return before.decode().strip() if before else None
+    tag = git(root, "describe", "--tags", "--abbrev=0", "--match", "v*")
+    return tag.decode().strip() if tag else None
 
 
 def breaking(root):
-    commit = baseline(root)
-    archive = git(root, "archive", commit, "proto") if commit else None
+    release = newest_release(root)
+    archive = git(root, "archive", release, "proto") if release else None
     if not archive:
-        print("no earlier state of the contract to compare with: only linted")
+        print("no release of the contract to compare with: only linted")
         return []
     with tempfile.TemporaryDirectory() as folder:
         with tarfile.open(fileobj=io.BytesIO(archive)) as tar:

@@ -26,10 +26,13 @@ class Contract(TreeTest):
     def write_contract(self, text):
         self.write("proto/carillon/v1/block.proto", text)
 
-    def commit(self):
+    def commit(self, *more):
         for arguments in (["init", "-q"], ["add", "-A"],
-                          ["-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "-qm", "x"]):
+                          ["-c", "user.name=a", "-c", "user.email=a@b.c", "commit", "-qm", "x"], *more):
             subprocess.run(["git", "-C", self.root, *arguments], check=True)
+
+    def release(self):
+        self.commit(["tag", "v1"])
 
     def test_a_clean_contract_passes(self):
         self.write_contract(GOOD)
@@ -41,7 +44,7 @@ class Contract(TreeTest):
 
     def test_a_changed_field_number_breaks(self):
         self.write_contract(GOOD)
-        self.commit()
+        self.release()
         self.write_contract(GOOD.replace("= 1", "= 2"))
         self.commit()
         self.assert_found(check_contract.check(self.root), "deleted")
@@ -52,9 +55,24 @@ class Contract(TreeTest):
         self.commit()
         self.assert_found(check_contract.check(self.root), "deleted")
 
-    def test_an_added_field_does_not_break(self):
+    def test_before_the_first_release_no_change_breaks(self):
         self.write_contract(GOOD)
         self.commit()
+        self.write_contract(GOOD.replace("= 1", "= 2"))
+        self.commit()
+        self.assert_found(check_contract.check(self.root))
+
+    def test_a_changed_message_of_the_workers_breaks_no_client(self):
+        private = GOOD.replace("carillon.v1", "carillon.worker.v1")
+        self.write("proto/carillon/worker/v1/block.proto", private)
+        self.write_contract(GOOD)
+        self.release()
+        self.write("proto/carillon/worker/v1/block.proto", private.replace("= 1", "= 2"))
+        self.assert_found(check_contract.check(self.root))
+
+    def test_an_added_field_does_not_break(self):
+        self.write_contract(GOOD)
+        self.release()
         self.write_contract(GOOD.replace("}\n", "  // More.\n  uint64 more = 2;\n}\n"))
         self.commit()
         self.assert_found(check_contract.check(self.root))
