@@ -19,7 +19,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "carillon/client.h"
-#include "carillon/contact_warnings.h"
 #include "carillon/lasting_stream.h"
 #include "client_sdk/c/c_conversion.h"
 #include "proto/cpp/error_reason.h"
@@ -92,9 +91,10 @@ absl::Status CreateModel(const carillon::client::Client& daemon, const std::stri
   return absl::OkStatus();
 }
 
-void KeepWarnings(const v1::StreamContactsResponse& report, uint64_t dropped_step_count) {
-  last_warnings =
-      absl::StrJoin(carillon::client::ContactWarnings(report, dropped_step_count), "\n");
+void KeepWarnings(const google::protobuf::RepeatedPtrField<v1::Warning>& warnings) {
+  last_warnings = absl::StrJoin(warnings, "\n", [](std::string* text, const v1::Warning& warning) {
+    absl::StrAppend(text, warning.id(), ": ", warning.text());
+  });
 }
 
 absl::StatusOr<carillon_sound> Render(const carillon::client::Client& daemon,
@@ -110,10 +110,7 @@ absl::StatusOr<carillon_sound> Render(const carillon::client::Client& daemon,
     return true;
   };
   ASSIGN_OR_RETURN(const v1::RenderSummary summary, daemon.Render(settings, trace, take));
-  v1::StreamContactsResponse report;
-  *report.mutable_findings() = summary.findings();
-  report.set_accepted_count(summary.accepted_count());
-  KeepWarnings(report, 0);
+  KeepWarnings(summary.warnings());
   if (summary.rejected_count() > 0) {
     return Refusal(absl::StatusCode::kInvalidArgument, summary.last_rejection().reason(),
                    summary.last_rejection().message());
@@ -287,7 +284,7 @@ carillon_code carillon_close_stream(carillon_stream* stream, carillon_report* re
   return Try([&]() -> absl::Status {
     last_warnings.clear();
     ASSIGN_OR_RETURN(const v1::StreamContactsResponse last, stream->stream->Finish());
-    KeepWarnings(last, stream->stream->DroppedStepCount());
+    KeepWarnings(last.warnings());
     if (report == nullptr) return absl::OkStatus();
     *report = {.step_count = last.step_count(),
                .accepted_count = last.accepted_count(),

@@ -167,9 +167,9 @@ const char* carillon_error(void);
 /** Returns the reason alone, such as "SERVER_UNAVAILABLE", which is stable. */
 const char* carillon_error_reason(void);
 /** Returns the probable mistakes in the contacts of one stream or one trace: the stream that this
- * thread has closed, or the trace that it has rendered, whichever happened later. Each line is a
- * sentence, for example about points that lie far from their objects. Without a mistake the text is
- * empty. The text is valid until this thread closes a stream or renders again. */
+ * thread has closed, or the trace that it has rendered, whichever happened later. Each line is an
+ * id of proto/README.md, such as POINTS_DISTANT, a colon and a sentence. Without a mistake the text
+ * is empty. The text is valid until this thread closes a stream or renders again. */
 const char* carillon_warnings(void);
 
 /** Connects to the daemon at "unix:PATH" or "HOST:PORT", or to the default daemon if `server` is

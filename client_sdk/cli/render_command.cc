@@ -63,14 +63,8 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
                   Counted(summary.rejected_count(), "impulse"), summary.last_rejection().reason(),
                   summary.last_rejection().message());
   }
-  const v1::ContactFindings& findings = summary.findings();
-  if (findings.distant_point_count() > 0) {
-    absl::FPrintF(out, "%s of contact far from the surface of the object, up to %.3g m\n",
-                  Counted(findings.distant_point_count(), "point"), findings.largest_distance_m());
-  }
-  if (findings.zero_impulse_count() > 0) {
-    absl::FPrintF(out, "%s without an impulse\n",
-                  Counted(findings.zero_impulse_count(), "contact"));
+  for (const v1::Warning& warning : summary.warnings()) {
+    absl::FPrintF(out, "%s: %s\n", warning.id(), warning.text());
   }
   PrintFindings(options, summary, out);
   if (summary.limited_frame_count() > 0) {
@@ -115,16 +109,12 @@ std::optional<double> BetterFullScale(const RenderOptions& options,
 }
 
 absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary) {
-  const v1::ContactFindings& findings = summary.findings();
-  const uint64_t contact_count = summary.accepted_count() + summary.rejected_count() +
-                                 findings.load_count() + findings.zero_impulse_count() +
-                                 findings.too_large_impulse_count();
-  // Sustained forces are not counted, but heard.
-  if (contact_count > 0 || summary.peak() > 0) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
-                 absl::StrCat(path,
-                              ": holds no contact, so there is nothing to hear; "
-                              "record a simulation in which something is struck"));
+  for (const v1::Warning& warning : summary.warnings()) {
+    if (warning.id() != "TRACE_EMPTY") continue;
+    return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
+                   absl::StrCat(path, ": ", warning.text()));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -70,9 +71,10 @@ v1::Impulse ImpulseOf(const StrikeOptions& options, uint32_t handle) {
   return impulse;
 }
 
-/// Sends the strike so that it sounds on arrival. Returns the warning about it, or an empty string.
-absl::StatusOr<std::string> SendImpulse(const client::Client& daemon, const std::string& scene,
-                                        uint32_t handle, const StrikeOptions& options) {
+/// Sends the strike so that it sounds on arrival. Returns the warnings about it.
+absl::StatusOr<std::vector<std::string>> SendImpulse(const client::Client& daemon,
+                                                     const std::string& scene, uint32_t handle,
+                                                     const StrikeOptions& options) {
   v1::ContactStreamStart start;
   start.set_scene(scene);
   start.set_step_s(kStep);
@@ -85,11 +87,11 @@ absl::StatusOr<std::string> SendImpulse(const client::Client& daemon, const std:
   if (report.rejected_count() > 0) {
     return FromErrorInfo(absl::StatusCode::kInvalidArgument, report.last_rejection());
   }
-  if (report.findings().distant_point_count() == 0) return "";
-  return absl::StrFormat(
-      "the point is %.3g m from the surface, and the strike sounds at the nearest point of the "
-      "surface; give metres in the frame of the object",
-      report.findings().largest_distance_m());
+  std::vector<std::string> warnings;
+  for (const v1::Warning& warning : report.warnings()) {
+    warnings.push_back(absl::StrCat(warning.id(), ": ", warning.text()));
+  }
+  return warnings;
 }
 
 /// The strike as a rendering measures it.
@@ -166,12 +168,10 @@ void PrintStrike(const client::Client& daemon, const v1::SoundingObject& object,
   }
 }
 
-/// Prints the object, how long it is heard, the warning if there is one and, where the daemon could
-/// measure them, the contact's duration, the peak, and the frames that the limiter lowers.
+/// Prints the object, how long it is heard, the warnings and, where the daemon could measure them,
+/// the contact's duration, the peak, and the frames that the limiter lowers.
 void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& object,
-                     const StrikeOptions& options, const std::string& warning) {
-  std::vector<std::string> warnings;
-  if (!warning.empty()) warnings.push_back(warning);
+                     const StrikeOptions& options, const std::vector<std::string>& warnings) {
   std::vector<JsonMember> members = {{"seconds", options.seconds.value_or(SoundingSeconds(object))},
                                      {"warnings", warnings}};
   if (const auto measured = Measure(daemon, object, options)) {
@@ -185,10 +185,10 @@ void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& obj
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
                       const StrikeOptions& options, const StopSignal& stop, bool json) {
   ASSIGN_OR_RETURN(const auto object, AddObject(daemon, scene, options));
-  ASSIGN_OR_RETURN(const std::string warning, SendImpulse(daemon, scene, object.handle(), options));
-  if (!warning.empty()) absl::FPrintF(stderr, "warning: %s\n", warning);
+  ASSIGN_OR_RETURN(const auto warnings, SendImpulse(daemon, scene, object.handle(), options));
+  for (const std::string& warning : warnings) absl::FPrintF(stderr, "warning: %s\n", warning);
   if (json) {
-    PrintStrikeJson(daemon, object, options, warning);
+    PrintStrikeJson(daemon, object, options, warnings);
   } else {
     PrintStrike(daemon, object, options);
   }

@@ -1,56 +1,77 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the table of error reasons in proto/README.md and the code name the same reasons."""
+"""Checks that the tables of proto/README.md and the code, that of the clients for Python and Node included, name the
+same error reasons and the same warnings."""
 
 import re
 
 import project
 
-TABLE = "proto/README.md"
-ROW = re.compile(r"^\| *`?([A-Z][A-Z0-9_]+)`? *\|")
+TABLES = "proto/README.md"
+ROW = re.compile(r"^\| *`?([A-Z][A-Z0-9_]+)`? *\| *([A-Z_]*)")
 NAME = r"([A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*)"
-# A literal "REASON: ..." or "REASON" as the second argument of a Refusal.
-USES = (
-    re.compile(rf'"{NAME}: '),
-    re.compile(rf'Refusal\(\s*[^,;"]+,\s*"{NAME}"'),
-)
+QUOTED = rf"['\"]{NAME}['\"]"
+# Of C++, a literal "REASON: ..." or "REASON" as the second argument of a Refusal; of a client, the first argument of an
+# error, or what a reason is compared with.
+REASONS = {
+    "cxx": (re.compile(rf'"{NAME}: '), re.compile(rf'Refusal\(\s*[^,;"]+,\s*"{NAME}"')),
+    "client": (re.compile(rf"(?:CarillonError|ServerUnavailable)\(\s*{QUOTED}"),
+               re.compile(rf"\breason\s*[!=]==?\s*{QUOTED}")),
+}
+WARNINGS = {
+    "cxx": (re.compile(rf'\bAdd\(\s*warnings,\s*"{NAME}"'), re.compile(rf'set_id\("{NAME}"\)')),
+    "client": (re.compile(rf"\bid(?:=|: ){QUOTED}"),),
+}
 MENTION = re.compile(rf'"{NAME}(?:: |")')
 
 
 def listed(root):
-    """(reason, line number) of each row of the table."""
-    lines = (root / TABLE).read_text().splitlines()
-    return [(row[1], number) for number, line in enumerate(lines, start=1) if (row := ROW.match(line))]
+    """The rows (name, gRPC code, line number) of the table of reasons, and those of the table of warnings."""
+    rows, heading = {"Warnings": [], "Errors": []}, "Errors"
+    for number, line in enumerate((root / TABLES).read_text().splitlines(), start=1):
+        if line.startswith("## "):
+            heading = line[3:]
+        if (row := ROW.match(line)) and heading in rows:
+            rows[heading].append((row[1], row[2], number))
+    return rows["Errors"], rows["Warnings"]
 
 
-def uses(root):
-    """(reason, file, line number) of each refusal in the code, and every name in quotes."""
-    found, mentioned = [], set()
+def sources(root):
+    """(kind, name, text without comments) of each file of the product's C++ and of the clients."""
     for path in project.cxx_files(root):
-        name = str(path.relative_to(root))
-        if name.startswith("tests/"):
-            continue
-        text = re.sub(r"^\s*//.*$", "", path.read_text(), flags=re.M)
-        mentioned.update(MENTION.findall(text))
-        for pattern in USES:
-            found += [(use[1], name, text.count("\n", 0, use.start(1)) + 1)
-                      for use in pattern.finditer(text)]
-    return found, mentioned
+        if not path.is_relative_to(root / "tests"):
+            yield "cxx", path.relative_to(root), re.sub(r"^\s*//.*$", "", path.read_text(), flags=re.M)
+    for folder, suffix in (("client_sdk/python/src/carillon", "*.py"), ("client_sdk/node/lib", "*.js")):
+        for path in sorted((root / folder).glob(suffix)):
+            yield "client", path.relative_to(root), path.read_text()
+
+
+def uses(files, patterns):
+    """(name, file, line number) of each use."""
+    for kind, path, text in files:
+        for pattern in patterns[kind]:
+            for use in pattern.finditer(text):
+                yield use[1], path, text.count("\n", 0, use.start(1)) + 1
 
 
 def check(root):
-    rows = listed(root)
-    known = {reason for reason, _ in rows}
-    found, mentioned = uses(root)
-    for reason, name, number in found:
-        if reason not in known:
-            yield f"{name}:{number}: {reason} is not in the table of {TABLE}"
-    for reason, number in rows:
-        if reason not in mentioned:
-            yield f"{TABLE}:{number}: no code gives {reason}"
-    names = [reason for reason, _ in rows]
-    if names != sorted(set(names)):
-        yield f"{TABLE}: the reasons are not in alphabetical order, each once"
+    files = list(sources(root))
+    reasons, warnings = listed(root)
+    codes = {code for _, code, _ in reasons}  # the reasons of errors without one
+    mentioned = {name for kind, _, text in files if kind == "cxx" for name in MENTION.findall(text)}
+    for rows, patterns, more_known, more_used in ((reasons, REASONS, codes, mentioned),
+                                                  (warnings, WARNINGS, set(), set())):
+        names = [name for name, _, _ in rows]
+        found = list(uses(files, patterns))
+        used = more_used | {name for name, _, _ in found}
+        for name, path, number in found:
+            if name not in more_known.union(names):
+                yield f"{path}:{number}: {name} is not in the table of {TABLES}"
+        for name, _, number in rows:
+            if name not in used:
+                yield f"{TABLES}:{number}: no code gives {name}"
+        if names != sorted(set(names)):
+            yield f"{TABLES}: the names are not in alphabetical order, each once"
 
 
 if __name__ == "__main__":

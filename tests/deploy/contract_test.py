@@ -98,6 +98,21 @@ class Reasons(TreeTest):
         self.write_table("NO_FILE")
         self.assert_found(check_reasons.check(self.root), "no code gives NO_FILE")
 
+    def test_reasons_and_warnings_of_the_clients_are_checked_too(self):
+        self.write("client_sdk/python/src/carillon/a.py", 'raise CarillonError("NO_FILE", "x")\n'
+                   'Warning(id="TOO_LATE")\nif error.reason == "NOT_FOUND" or error.reason != "NO_NAME":')
+        self.write("client_sdk/node/lib/a.js", "throw new CarillonError('NO_BODY', 'x'); warn({ id: 'TOO_SOON' });")
+        self.write("server/a.cc", 'Add(warnings, "TOO_LOUD", 1);')
+        self.write_table("NO_FILE")
+        expected = ("a.py:3: NO_NAME is not", "a.js:1: NO_BODY is not", "a.cc:1: TOO_LOUD is not",
+                    "a.py:2: TOO_LATE is not", "a.js:1: TOO_SOON is not")
+        self.assert_found(check_reasons.check(self.root), *expected)
+        self.write_table("NO_BODY", "NO_FILE", "NO_NAME")
+        table = self.root / "proto/README.md"
+        table.write_text(table.read_text() + "## Warnings\n" + "".join(
+            f"| {name} | m |\n" for name in ("TOO_LATE", "TOO_LOUD", "TOO_QUIET", "TOO_SOON")))
+        self.assert_found(check_reasons.check(self.root), "no code gives TOO_QUIET")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -43,9 +43,10 @@ class ExamplesTest(DaemonTest):
     def test_blocks_sound_from_every_engine(self):
         for engine in falls.ENGINES:
             with self.subTest(engine):
-                findings = self.run_example("blocks", engine, 0.5).summary.findings
+                summary = self.run_example("blocks", engine, 0.5).summary
+                distant_count = sum(one.count for one in summary.warnings if one.id == "POINTS_DISTANT")
                 # An engine lets a corner sink in now and then; points in a wrong frame would be far away throughout.
-                self.assertLess(findings.distant_point_count, 0.01 * findings.load_count)
+                self.assertLess(distant_count, 0.01 * summary.findings.load_count)
 
     def test_every_other_example_sounds(self):
         for name, engine, seconds in (("boxes", "ode", 0.5), ("letters", "mujoco", 0.8), ("bowl", "bullet", 0.4),

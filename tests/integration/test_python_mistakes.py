@@ -35,8 +35,8 @@ class MistakesTest(PackageTest):
                   "    stream.step(i / 240, contacts=carillon.Contacts(bar, [(90, 0, 0)], [(0, 0, -1e-3)]))\n"
                   "    time.sleep(1 / 240)\n")
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
-        self.assertRegex(done.stderr, "a stream of scenes/.* was not closed")
-        self.assertRegex(done.stderr, r"lie up to [89]\d\S* m away")
+        self.assertIn("ContactWarning: STREAM_NOT_CLOSED: ", done.stderr)
+        self.assertIn("ContactWarning: POINTS_DISTANT: ", done.stderr)
 
     def test_partners_that_change_and_time_that_stands_still_are_told(self):
         def told(partner, time_s):
@@ -47,15 +47,14 @@ class MistakesTest(PackageTest):
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
                 sound = self.c.render(trace)
-            return sound.summary.findings.blow_count, [str(one.message) for one in caught]
+            return sound.summary.findings.blow_count, [(one.message.id, one.message.count) for one in caught]
 
-        blow_count, texts = told(lambda i: 1, lambda i: i / 240)
-        self.assertEqual(texts, [])
-        strikes, (text,) = told(lambda i: i, lambda i: i / 240)
-        self.assertRegex(text, "^in 58 steps an object in contact touched none of its partners")
+        blow_count, warned = told(lambda i: 1, lambda i: i / 240)
+        self.assertEqual(warned, [])
+        strikes, warned = told(lambda i: i, lambda i: i / 240)
+        self.assertEqual(warned, [("PARTNERS_CHANGE", 58)])
         self.assertGreater(strikes, 10 * blow_count)
-        _, (text,) = told(lambda i: 1, lambda i: 0)
-        self.assertRegex(text, "^59 steps with contacts had the time of the step before")
+        self.assertEqual(told(lambda i: 1, lambda i: 0)[1], [("TIME_STANDS", 59)])
 
     def test_mistakes_that_were_silent_are_refused(self):
         trace = carillon.Trace(step=1 / 240)
@@ -68,7 +67,7 @@ class MistakesTest(PackageTest):
         for step_s in (-1, 4.17, 1e-9, float("nan")):
             wrong = carillon.Trace(step=step_s)
             wrong.step(0, impulses=carillon.Impulses(wrong.add(self.model), [(0, 0, 0)], [(0, 0, -1e-3)]))
-            with self.assertRaisesRegex(carillon.CarillonError, "step is .* s; say the simulator's step, from 1e-6"):
+            with self.assertRaisesRegex(carillon.CarillonError, "step_s is .*; say the simulator's step, from 1e-6"):
                 self.c.render(wrong)
         with self.assertRaisesRegex(ValueError, r"must end with \.wav"):
             carillon.Sound(numpy.zeros((1, 1)), 48000, 0).save(self.folder / "x.mp3")

@@ -104,7 +104,7 @@ class ContactStreamCall final
 
   v1::StreamContactsResponse Report() const override {
     absl::MutexLock lock(&mutex_);
-    return report_;
+    return ReportLocked();
   }
 
   absl::StatusOr<v1::StreamContactsResponse> Finish() override {
@@ -113,7 +113,7 @@ class ContactStreamCall final
     if (holding_ && queue_.empty() && !writing_) EndWritesLocked();
     mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
     if (!status_->ok()) return *status_;
-    return report_;
+    return ReportLocked();
   }
 
  private:
@@ -150,6 +150,21 @@ class ContactStreamCall final
     const absl::Status result = FromRpc(status, server_);
     absl::MutexLock lock(&mutex_);
     status_ = result;
+  }
+
+  /// Returns the daemon's newest answer, with the warning that only the client can give.
+  v1::StreamContactsResponse ReportLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    v1::StreamContactsResponse report = report_;
+    if (dropped_step_count_ > 0) {
+      v1::Warning& warning = *report.add_warnings();
+      warning.set_id("STEPS_DROPPED");
+      warning.set_count(dropped_step_count_);
+      warning.set_text(absl::StrCat(
+          dropped_step_count_, dropped_step_count_ == 1 ? " step was" : " steps were",
+          " not sent, because too many waited for the network; send fewer steps in one second, or "
+          "smaller ones"));
+    }
+    return report;
   }
 
   /// Returns the number of waiting steps that the next message takes.

@@ -5,7 +5,7 @@ const util = require('util');
 const { defaultServer } = require('./address');
 const { choice, nearest, refuse, refuseNoMessage, refuseNoNumbers, refuseNoObject,
   refuseUnknown } = require('./checks');
-const { frameInWords, given, toPose } = require('./contacts');
+const { given, toPose } = require('./contacts');
 const { services } = require('./contract');
 const { channelCredentials, channelOptions } = require('./credentials');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
@@ -42,13 +42,6 @@ function connect(server, options = {}) {
   const address = server ?? defaultServer();
   if (typeof address !== 'string' || /^(\/|https?:\/\/)/i.test(address)) refuse(address, 'server', '"unix:PATH" or "HOST:PORT"');
   return new Client(address, options);
-}
-
-/** Throws CarillonError if nothing was struck in a rendering. Sustained forces are not counted, but heard. */
-function refuseWithoutContacts({ accepted_count: accepted, peak, findings }) {
-  if (accepted || peak || findings?.load_count || findings?.zero_impulse_count) return;
-  throw new CarillonError('TRACE_EMPTY', 'the trace holds no contact, so there is nothing to hear; record a simulation ' +
-    'in which something is struck');
 }
 
 /** The request for a model: an object, or the name of its material alone and then an object with the rest. */
@@ -303,8 +296,9 @@ class Client {
       else summary = answer.summary;
     }
     if (summary.rejected_count) throw fromInfo(summary.last_rejection);
-    refuseWithoutContacts(summary);
-    warnOfContacts(summary.findings, frameInWords(whole.header.frame), Number(summary.accepted_count ?? 0));
+    const empty = summary.warnings.find(({ id }) => id === 'TRACE_EMPTY');
+    if (empty) throw new CarillonError(empty.id, empty.text);
+    warnOfContacts(summary.warnings);
     if (summary.paper_coupling_object_count) await this.warnOfTransfers(whole.objects.map((object) => object.modal_model));
     return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
   }

@@ -3,7 +3,6 @@
 
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole } = require('./checks');
 const { CarillonError } = require('./errors');
-const { SCENE_FRAME } = require('./warnings');
 
 // The largest magnitude of the time of a step, as contact.proto says.
 const LARGEST_TIME_S = 1e10;
@@ -278,9 +277,5 @@ function objectsOf(content) {
   return rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
 }
 
-function frameInWords(frame) {
-  return frame === 'FRAME_SCENE' ? SCENE_FRAME : "each object's own frame";
-}
-
-module.exports = { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+module.exports = { countRows, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
   toPose };

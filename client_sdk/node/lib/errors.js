@@ -26,46 +26,11 @@ class CarillonError extends Error {
 /** No daemon answers at the address. */
 class ServerUnavailable extends CarillonError {}
 
-// The caller's names of fields and calls of the contract that messages of the daemon mention.
-const CALLER_NAMES = { step_s: 'step', scheduling_delay_s: 'delay', glide_s: 'glide',
-  'columns(?=\\[)': 'impulses', 'contact_columns(?=\\[)': 'contacts', 'sustained(?=\\[)': 'forces',
-  'pose_columns(?=\\[)': 'poses', 'SceneService.CreateScene': 'Client.createScene()' };
-
-/** Replaces names of the contract by those of the caller, and adds the unit, seconds, that a name loses. */
-function inNamesOfCaller(text, names) {
-  let made = text;
-  for (const [field, name] of Object.entries(names)) {
-    const unit = field.endsWith('_s') ? ' s' : '';
-    made = made.replace(new RegExp(`\\b${field} is ([^ ;]+); it must be (\\S+) to (\\S+)`, 'g'),
-      `${name} is $1${unit}; it must be $2 to $3${unit}`);
-    made = made.replace(new RegExp(`\\b${field} is ([^ ;]+);`, 'g'), `${name} is $1${unit};`);
-    made = made.replace(new RegExp(`\\b${field}\\b`, 'g'), name);
-  }
-  return made;
-}
-
-/** A remedy as a part of createModel's request, such as settings: { mesh: { repair: true } }. */
-function settingOf({ field, value }) {
-  const [name, ...inner] = field.split('.');
-  return `${name}: ${inner.reduceRight((made, part) => `{ ${part}: ${made} }`, value)}`;
-}
-
 /** Makes the error that an ErrorInfo of the contract describes. */
 function fromInfo(info) {
   const [remedy] = info.remedies ?? [];
-  const help = remedy?.value ? `; it may help to call createModel with ${settingOf(remedy)}` : '';
-  return new CarillonError(info.reason, inNamesOfCaller(info.message, CALLER_NAMES) + help, info.metadata, info.remedies);
-}
-
-/** Waits for a result. A refusal has the caller's names of fields of the contract. */
-async function inNames(names, result) {
-  try {
-    return await result;
-  } catch (error) {
-    if (!(error instanceof CarillonError) || error instanceof ServerUnavailable) throw error;
-    const text = error.message.slice(`${error.reason}: `.length);
-    throw new CarillonError(error.reason, inNamesOfCaller(text, names), error.metadata, error.remedies);
-  }
+  const help = remedy?.value ? `; it may help to set ${remedy.field} to ${remedy.value}` : '';
+  return new CarillonError(info.reason, info.message + help, info.metadata, info.remedies);
 }
 
 /** Makes the error of a failed call; its rich status is in the trailing metadata. */
@@ -91,4 +56,4 @@ function fromCall(error, server) {
   return new CarillonError(grpc.status[error.code], error.details);
 }
 
-module.exports = { CarillonError, ServerUnavailable, fromCall, fromInfo, inNames };
+module.exports = { CarillonError, ServerUnavailable, fromCall, fromInfo };

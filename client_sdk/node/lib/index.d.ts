@@ -25,6 +25,7 @@ import type { Scene__Output } from '../types/carillon/v1/Scene';
 import type { SoundingObject__Output } from '../types/carillon/v1/SoundingObject';
 import type { StreamContactsResponse__Output } from '../types/carillon/v1/StreamContactsResponse';
 import type { UpdateMixerResponse__Output } from '../types/carillon/v1/UpdateMixerResponse';
+import type { Warning__Output as Warning } from '../types/carillon/v1/Warning';
 
 /** x, y, z in metres or newton seconds. */
 export type Vector = ArrayLike<number>;
@@ -252,6 +253,8 @@ export class ContactStream {
   /** How many steps wait for the network. */
   readonly waitingStepCount: number;
   readonly findings?: ContactFindings__Output;
+  /** What was probably not meant about the contacts so far; `text` is a sentence, and `id` is stable. */
+  readonly warnings: Warning[];
   /** Why the newest rejected contact was rejected. */
   readonly rejection?: CarillonError;
   /**
@@ -263,7 +266,7 @@ export class ContactStream {
   step(time: number, content?: StepContent): Promise<void>;
   /**
    * Waits until the daemon has taken all steps. Returns the last report. Unless `warn` is false, the process warns of
-   * contacts that were late, lost or rejected or that lie far from their objects, by a ContactWarning.
+   * each fact in `warnings` by a ContactWarning, whose code is the id.
    */
   close(warn?: boolean): Promise<StreamContactsResponse__Output>;
 }

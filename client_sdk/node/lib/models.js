@@ -4,7 +4,6 @@
 const util = require('util');
 const { counted, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { strikeOf } = require('./contacts');
-const { inNames } = require('./errors');
 const { Trace } = require('./traces');
 
 /**
@@ -74,8 +73,7 @@ class Model {
     const trace = new Trace({ simulator: 'carillon (Node)' });
     const object = trace.add(this, { material, size, gain });
     trace.step(0, { impulses: strikeOf(object, strike) });
-    return inNames({ tail_s: 'seconds', sample_rate_hz: 'sampleRateHz' },
-      this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz }));
+    return this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz });
   }
 
   [util.inspect.custom]() {

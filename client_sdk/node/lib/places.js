@@ -6,18 +6,11 @@ const { setTimeout } = require('timers/promises');
 
 // The daemon gives the place of a rendering back a little after its end.
 const PAUSES_MS = Array.from({ length: 8 }, (_, i) => 10 * 2 ** i);
-// Of a daemon that does not know GetServerInfo.
-const MOST_RENDERINGS = 4;
 
 /** Returns how many renderings the daemon lets one client have at a time. */
 async function mostRenderings(client) {
-  try {
-    const { limits } = await client.info();
-    return Math.max(1, Math.floor(limits.rendering_count * limits.client_share));
-  } catch (error) {
-    if (error.reason !== 'UNIMPLEMENTED') throw error;
-    return MOST_RENDERINGS;
-  }
+  const { limits } = await client.info();
+  return Math.max(1, Math.floor(limits.rendering_count * limits.client_share));
 }
 
 /** Some places. Who finds none waits for the next that is given back. */

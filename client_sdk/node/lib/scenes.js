@@ -3,12 +3,12 @@
 
 const util = require('util');
 const { counted, refuseNoNumbers, refuseNoObject, refuseUnknown } = require('./checks');
-const { countRows, frameInWords, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
+const { countRows, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
   toPose } = require('./contacts');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toMaterial, toRadiation } = require('./materials');
 const { streamSettings } = require('./traces');
-const { warnOfContacts, warnOfOpenStream, warnOfStream } = require('./warnings');
+const { warnOfContacts, warnOfOpenStream } = require('./warnings');
 
 // Steps that may wait for the network before the oldest is dropped.
 const MOST_WAITING = 4096;
@@ -40,7 +40,7 @@ class SoundingObject {
     stream.step(0, { impulses });
     await stream.close(false);
     if (stream.rejection) throw stream.rejection;
-    warnOfContacts(stream.findings, "the object's own frame");
+    warnOfContacts(stream.warnings);
   }
 
   /**
@@ -176,10 +176,8 @@ function refuseOtherScenes(content, scene) {
 /**
  * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far. It counts an impulse
  * as accepted before it sounds: one that is due after the scene is deleted is never heard, for which `report.ahead_s`
- * says how long to wait after the end. `droppedStepCount`
- * steps were not sent: the oldest ones, when 4096 waited. When it is closed, one warning of the process, a
- * ContactWarning, tells of contacts that were late, lost or rejected and of time that was mapped anew, and another of
- * contacts that lie far from their objects.
+ * says how long to wait after the end. `droppedStepCount` steps were not sent: the oldest ones, when 4096 waited. When it
+ * is closed, a warning of the process, a ContactWarning, tells of each fact in `warnings`.
  */
 class ContactStream {
   constructor(scene, start) {
@@ -197,7 +195,7 @@ class ContactStream {
         this.error = fromCall(error, client.server);
         if (client.isClosed && !this.isClosing) {
           warnOfOpenStream(start.scene);
-          warnOfStream(this.report ?? {}, frameInWords(start.frame), this.droppedStepCount);
+          warnOfContacts(this.warnings);
         }
       });
       this.call.on('close', () => {
@@ -240,9 +238,21 @@ class ContactStream {
     return this.waiting.splice(0, count);
   }
 
-  /** What the daemon found out about the contacts so far, such as blow_count and distant_point_count. */
+  /** What the daemon found out about the contacts so far, such as blow_count. */
   get findings() {
     return this.report?.findings ?? undefined;
+  }
+
+  /** What was probably not meant about the contacts so far, each with id, count, figures and text. */
+  get warnings() {
+    const told = [...(this.report?.warnings ?? [])];
+    const count = this.droppedStepCount;
+    if (count) {
+      told.push({ id: 'STEPS_DROPPED', count, figures: {}, text: `${counted(count, 'step')} not sent, because over ` +
+        `${MOST_WAITING} waited for the network; await stream.step(...), because a loop that never awaits anything sends ` +
+        'nothing before it ends' });
+    }
+    return told;
   }
 
   /** Why the newest rejected contact was rejected; undefined if none was so far. */
@@ -307,7 +317,7 @@ class ContactStream {
     this.write();
     await this.ended;
     if (this.error) throw this.error;
-    if (warn) warnOfStream(this.report, frameInWords(this.start.frame), this.droppedStepCount);
+    if (warn) warnOfContacts(this.warnings);
     return this.report;
   }
 }

@@ -203,15 +203,6 @@ v1::ContactFindings ToProto(const IntakeFindings& findings) {
   v1::ContactFindings proto;
   proto.set_blow_count(findings.engine.blow_count);
   proto.set_load_count(findings.engine.load_count);
-  proto.set_distant_point_count(findings.distant_point_count);
-  proto.set_largest_distance_m(findings.largest_distance_m);
-  proto.set_zero_impulse_count(findings.zero_impulse_count);
-  proto.set_too_large_impulse_count(findings.too_large_impulse_count);
-  proto.set_regular_gap_s(findings.regular_gap_s);
-  proto.set_fast_impulse_count(findings.fast_impulse_count);
-  proto.set_largest_speed_change_m_per_s(findings.largest_speed_change_m_per_s);
-  proto.set_changed_partner_count(findings.engine.changed_partner_count);
-  proto.set_standing_step_count(findings.standing_step_count);
   return proto;
 }
 

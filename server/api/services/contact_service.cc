@@ -13,6 +13,7 @@
 #include "server/api/call/status_conversion.h"
 #include "server/api/call/stream_call.h"
 #include "server/api/convert/contact_conversion.h"
+#include "server/api/convert/contact_warnings.h"
 #include "server/api/convert/resource_name.h"
 #include "server/base/mutex.h"
 
@@ -220,7 +221,9 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     if (!stream_->last_rejection().ok()) {
       *answer.mutable_last_rejection() = ToLegibleErrorInfo(stream_->last_rejection());
     }
-    *answer.mutable_findings() = ToProto(stream_->findings());
+    const IntakeFindings findings = stream_->findings();
+    *answer.mutable_findings() = ToProto(findings);
+    AddWarnings(findings, answer);
     return answer;
   }
 

@@ -15,6 +15,7 @@
 #include "server/api/call/status_conversion.h"
 #include "server/api/call/stream_call.h"
 #include "server/api/convert/contact_conversion.h"
+#include "server/api/convert/contact_warnings.h"
 #include "server/api/convert/sample_bytes.h"
 #include "server/api/convert/trace_reader.h"
 #include "server/loudness/loudness_meter.h"
@@ -133,6 +134,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     *summary.mutable_findings() = ToProto(rendered.findings);
     summary.set_paper_coupling_object_count(rendered.paper_coupling_object_count);
     summary.set_peak(rendered.peak);
+    AddWarnings(rendered.findings, summary);
     summary.set_limited_frame_count(rendered.limited_frame_count);
     summary.set_full_scale_pa(reader_.full_scale_pa());
     summary.set_peak_pa(rendered.peak * reader_.full_scale_pa());

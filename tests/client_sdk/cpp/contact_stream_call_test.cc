@@ -125,6 +125,20 @@ TEST_F(ContactStreamCallTest, AMessageIsNoLargerThanItsFirstStepOr64KiB) {
   EXPECT_GT(std::ranges::max(service_.step_counts), 1);
 }
 
+TEST_F(ContactStreamCallTest, WarnsOfTheStepsThatItDropped) {
+  MakeStepsWait();
+  Send(ContactStream::kMaxQueuedSteps + 100, 1);
+  service_.may_read.Notify();
+  const auto report = stream_->Finish();
+  ASSERT_TRUE(report.ok());
+  const uint64_t dropped = stream_->DroppedStepCount();
+  EXPECT_GE(dropped, 100U);
+  EXPECT_EQ(report->step_count(), static_cast<uint64_t>(sent_count_) - dropped);
+  ASSERT_EQ(report->warnings_size(), 1);
+  EXPECT_EQ(report->warnings(0).id(), "STEPS_DROPPED");
+  EXPECT_EQ(report->warnings(0).count(), dropped);
+}
+
 TEST_F(ContactStreamCallTest, RefusesAStepWhoseTimeIsTooLargeOrGoesBackAndGoesOn) {
   const auto send = [&](double time_s) {
     v1::ContactStep step;

@@ -10,7 +10,7 @@ const { Metadata } = require('@grpc/grpc-js');
 const { fromCall, fromInfo } = require('carillon/lib/errors');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
-const { warnOfContacts, warnOfLabel, warnOfStream, warnOfUnit } = require('carillon/lib/warnings');
+const { warnOfContacts, warnOfLabel, warnOfUnit } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
@@ -23,16 +23,12 @@ const mesh = { vertices: [POINT], triangles: [[0, 0, 0]] };
 /** The warnings of the process that a function makes. */
 async function warningsOf(function_) {
   const told = [];
-  const listener = (warning) => told.push(`${warning.name}: ${warning.message}`);
+  const listener = (warning) => told.push(`${[warning.name, warning.code].join(' ').trim()}: ${warning.message}`);
   process.on('warning', listener);
   function_();
   await new Promise(setImmediate);
   process.off('warning', listener);
   return told;
-}
-
-function told(counts, frame = "each object's own frame", dropped = 0) {
-  return warningsOf(() => warnOfStream({ scheduling_delay_s: 0.02, ...counts }, frame, dropped));
 }
 
 /** A stream whose steps all wait, as if the network took none. */
@@ -58,47 +54,14 @@ test('a token crosses no network in clear', () => {
   }
 });
 
-test('a stream in time is silent', async () => assert.deepEqual(await told({ accepted_count: 7 }), []));
-
-test('late contacts, new mappings and lost steps are told once', async () => {
-  const [text, ...others] = await told({ late_count: 1, remap_count: 2, dropped_count: 3 }, 'its frame', 1);
-  assert.deepEqual(others, []);
-  assert.match(text, /^ContactWarning: 1 contact was late.*it was 0\.02.*anew 2 times.*3 contacts were lost.*1 step was/);
-  assert.match(text, /1 step was not sent, .* await stream\.step/);
-});
-
-test('a rejection and a distant point name the frame of the stream', async () => {
-  const rejection = { reason: 'POINT_NOT_FINITE', message: "send metres in the object's frame" };
-  assert.deepEqual(await told({ rejected_count: 1, last_rejection: rejection }, "the scene's frame"),
-    ["ContactWarning: 1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's frame"]);
-  const [text] = await warningsOf(() => warnOfContacts({ distant_point_count: 1, largest_distance_m: 0.5 }, 'a frame'));
-  assert.match(text, /1 contact lies up to 0\.5 m away .* sounds at .* in metres, in a frame$/);
-});
-
-test('forces in place of impulses and a simulation ahead of its sound are told', async () => {
-  assert.match((await told({ findings: { fast_impulse_count: 1, largest_speed_change_m_per_s: 480 } })).join(),
-    /1 contact changed the speed of an object by up to 480 m\/s; give impulses in newton seconds/);
-  assert.deepEqual(await told({ scheduling_delay_s: 0.1, ahead_s: 0.3 }), []);
-  assert.match((await told({ scheduling_delay_s: 0.1, ahead_s: 4 })).join(), /the newest step sounds only in 4 s/);
-});
-
-test('time that stands still and partners that change are told', async () => {
-  assert.match((await told({ findings: { standing_step_count: 10 } })).join(),
-    /^ContactWarning: 10 steps with contacts had the time of the step before; give each step/);
-  assert.match((await told({ findings: { changed_partner_count: 11 } })).join(),
-    /in 11 steps an object in contact touched none of its partners .* number of that body$/);
-});
-
-test('a step stated too short and impulses that are all zero are told', async () => {
-  assert.match((await told({ findings: { regular_gap_s: 1 / 120, blow_count: 9 } })).join(),
-    /most steps came 0\.00833 s apart/);
-  for (const counts of [{ load_count: 12 }, {}]) {
-    assert.match((await told({ accepted_count: 24, findings: { zero_impulse_count: 12, ...counts } })).join(),
-      /^ContactWarning: the impulse of 12 contacts was zero/);
-  }
-  for (const counts of [{ load_count: 13 }, { blow_count: 1 }]) {
-    assert.deepEqual(await told({ findings: { zero_impulse_count: 12, ...counts } }), []);
-  }
+test('warnings of the daemon are told by their ids, and steps that were not sent by the client', async () => {
+  assert.deepEqual(await warningsOf(() => warnOfContacts([{ id: 'TIME_STANDS', count: 10, figures: {}, text: 'a sentence' }])),
+    ['ContactWarning TIME_STANDS: TIME_STANDS: a sentence']);
+  const stream = stoppedStream();
+  assert.deepEqual(stream.warnings, []);
+  stream.report = { warnings: [{ id: 'TIME_STANDS' }] };
+  stream.droppedStepCount = 1;
+  assert.deepEqual(stream.warnings.map(({ id, count }) => [id, count]), [['TIME_STANDS', undefined], ['STEPS_DROPPED', 1]]);
 });
 
 test('an object of another scene is refused', async () => {
@@ -370,27 +333,9 @@ test('a message that is too large tells how to repair it', () => {
     'takes at most 2097152; report fewer points in a step, or ask for less in one call');
 });
 
-test('refusals of the daemon have the names of the caller', () => {
-  for (const [said, expected] of [['step_s is 0; say', 'step is 0 s; say'],
-    ['scheduling_delay_s is 20; it must be 0 to 10', 'delay is 20 s; it must be 0 to 10 s'],
-    ['glide_s is -1; it must be 0 to 10', 'glide is -1 s; it must be 0 to 10 s'],
-    ['columns[17]: x', 'impulses[17]: x'], ['contact_columns[2]: x', 'contacts[2]: x'],
-    ['make one with SceneService.CreateScene', 'make one with Client.createScene()']]) {
-    assert.equal(fromInfo({ reason: 'INVALID', message: said }).message, `INVALID: ${expected}`);
-  }
-});
-
-test('a remedy is told as createModel takes it', async () => {
-  for (const [field, value, expected] of [
-    ['settings.mesh.repair', 'true', 'settings: { mesh: { repair: true } }'],
-    ['settings.metres_per_unit', '1', 'settings: { metres_per_unit: 1 }'],
-    ['max_frequency_hz', '5000', 'max_frequency_hz: 5000']]) {
-    const { message } = fromInfo({ reason: 'INVALID', message: 'x', remedies: [{ field, value }] });
-    assert.equal(message, `INVALID: x; it may help to call createModel with ${expected}`);
-    // The words can be pasted into a call, which refuses no name of them.
-    const request = new Function(`return { ${expected} }`)();
-    await assert.rejects(c.createModel(mesh, 'oak', request), carillon.ServerUnavailable);
-  }
+test('a refusal is told as the daemon wrote it, with the first remedy', () => {
+  const info = { reason: 'INVALID', message: 'step_s is 0; say', remedies: [{ field: 'settings.mesh.repair', value: 'true' }] };
+  assert.equal(fromInfo(info).message, 'INVALID: step_s is 0; say; it may help to set settings.mesh.repair to true');
 });
 
 test('all that a user meets is shown in one short line', () => {

@@ -33,7 +33,7 @@ async function main(): Promise<void> {
   });
   const late: number = (await stream.close(false)).late_count + stream.lateCount + stream.remapCount;
   const reason: string | undefined = stream.rejection?.reason;
-  const far: number | undefined = stream.findings?.largest_distance_m;
+  const far: number | undefined = stream.warnings[0]?.figures.largest_distance_m;
   for await (const found of c.models({ label_contains: 'bell' })) console.log(found.label, found.modeCount);
   const trace = new carillon.Trace({ step: 0.01, pulseShape: 'gaussian' });
   trace.step(0, { contacts: [{ object: trace.add(model), point: [0, 0, 0], impulse: [0, 0, 1], partner: 2 }] });

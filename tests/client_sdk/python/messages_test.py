@@ -17,7 +17,7 @@ import numpy
 import carillon
 from carillon.v1 import (
     audio_service_pb2, contact_pb2, contact_service_pb2, decomposition_pb2, error_pb2, modal_model_service_pb2,
-    scene_service_pb2)
+    scene_service_pb2, warning_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
 MESH = ([(0, 0, 0)], [(0, 0, 0)])
@@ -46,35 +46,15 @@ class MessagesTest(unittest.TestCase):
 
 
 class WarningsTest(unittest.TestCase):
-    def told(self, frame="each object's own frame", dropped=0, **counts):
-        report = contact_service_pb2.StreamContactsResponse(scheduling_delay_s=0.02, **counts)
-        return warnings_of(carillon.errors.warn_of_stream, report, frame, dropped)
-
-    def test_a_stream_in_time_is_silent(self):
-        self.assertEqual(self.told(accepted_count=7), [])
-
-    def test_late_contacts_and_new_mappings_are_told_once(self):
-        text, = self.told(late_count=1, remap_count=2)
-        self.assertIn("1 contact was late", text)
-        self.assertIn("mapped anew 2 times", text)
-        self.assertIn("it was 0.02", text)
-
-    def test_a_warning_is_of_the_line_that_uses_the_package(self):
-        report = contact_service_pb2.StreamContactsResponse(late_count=1)
+    def test_warnings_of_the_daemon_are_told_by_their_ids_as_of_the_line_that_uses_the_package(self):
+        warning = warning_pb2.Warning(id="POINTS_DISTANT", count=1, figures={"largest_distance_m": 2},
+                                      text="a sentence")
         with self.assertWarns(carillon.ContactWarning) as caught:
-            carillon.errors.warn_of_stream(report, "a frame")
+            carillon.errors.warn_of_contacts([warning])
         self.assertEqual(caught.filename, __file__)
-
-    def test_lost_contacts_and_steps_are_told(self):
-        text, = self.told(dropped_count=3, dropped=1)
-        self.assertIn("3 contacts were lost", text)
-        self.assertIn("1 step was not sent", text)
-
-    def test_a_rejection_names_the_frame_of_the_stream(self):
-        rejection = error_pb2.ErrorInfo(reason="POINT_NOT_FINITE", message="send metres in the object's frame")
-        text, = self.told("the scene's frame", rejected_count=1, last_rejection=rejection)
-        self.assertEqual(text, "1 contact was rejected, the last one with POINT_NOT_FINITE: send metres in the scene's "
-                               "frame")
+        for told in caught.warning, pickle.loads(pickle.dumps(caught.warning)):
+            self.assertEqual((told.id, told.count, told.figures, str(told)),
+                             ("POINTS_DISTANT", 1, {"largest_distance_m": 2}, "POINTS_DISTANT: a sentence"))
 
     def test_a_body_of_a_likely_wrong_unit_is_told_once(self):
         texts, before = [], decomposition_pb2.Job()
@@ -84,33 +64,6 @@ class WarningsTest(unittest.TestCase):
             before = job
         self.assertEqual([len(text) for text in texts], [0, 0, 1, 0])
         self.assertRegex(texts[2][0], '^the body is 202 m across; .*unit="mm"$')
-
-    def test_one_distant_point_is_one_contact(self):
-        findings = contact_pb2.ContactFindings(distant_point_count=1, largest_distance_m=0.5)
-        text, = warnings_of(carillon.errors.warn_of_contacts, findings, "the scene's frame")
-        self.assertRegex(text, "^1 contact lies up to 0.5 m .* in the scene's frame, and the pose of each object$")
-
-    def test_forces_in_place_of_impulses_and_a_simulation_ahead_of_its_sound_are_told(self):
-        text, = self.told(findings={"fast_impulse_count": 1, "largest_speed_change_m_per_s": 480, "blow_count": 1})
-        self.assertRegex(text, "^1 contact changed the speed of an object by up to 480 m/s; give impulses in newton")
-        self.assertEqual(self.told(ahead_s=0.25), [])
-        text, = self.told(ahead_s=4)
-        self.assertRegex(text, "^the newest step sounds only in 4 s, .* render a carillon.Trace$")
-
-    def test_time_that_stands_still_and_partners_that_change_are_told(self):
-        text, = self.told(findings={"standing_step_count": 10})
-        self.assertRegex(text, "^10 steps with contacts had the time of the step before; give each step")
-        text, = self.told(findings={"changed_partner_count": 11})
-        self.assertRegex(text, "^in 11 steps an object in contact touched none of its partners .* number of that body$")
-
-    def test_a_step_stated_too_short_and_impulses_that_are_all_zero_are_told(self):
-        text, = self.told(findings={"regular_gap_s": 1 / 120, "blow_count": 9})
-        self.assertIn("most steps came 0.00833 s apart", text)
-        for counts in ({"load_count": 12}, {}):
-            text, = self.told(accepted_count=24, findings={"zero_impulse_count": 12, **counts})
-            self.assertIn("the impulse of 12 contacts was zero", text)
-        for counts in ({"load_count": 13}, {"blow_count": 1}):
-            self.assertEqual(self.told(findings={"zero_impulse_count": 12, **counts}), [])
 
 
 class RefusalsTest(MessagesTest):
@@ -292,27 +245,11 @@ class RefusalsTest(MessagesTest):
                          "MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon takes at most 2097152; report "
                          "fewer points in a step, or ask for less in one call")
 
-    def test_refusals_of_the_daemon_have_the_names_of_the_caller(self):
-        for said, expected in (("step_s is 0; say the simulator's step", "step is 0 s; say the simulator's step"),
-                               ("scheduling_delay_s is 20; it must be 0 to 10", "delay is 20 s; it must be 0 to 10 s"),
-                               ("glide_s is -1; it must be 0 to 10", "glide is -1 s; it must be 0 to 10 s"),
-                               ("columns[17]: x", "impulses[17]: x"),
-                               ("contact_columns[2]: x", "contacts[2]: x"),
-                               ("pose_columns[2]: x", "poses[2]: x"),
-                               ("make one with SceneService.CreateScene", "make one with Client.scene()")):
-            info = error_pb2.ErrorInfo(reason="INVALID", message=said)
-            self.assertEqual(carillon.errors.from_info(info).message, expected)
-
-    def test_a_remedy_is_told_as_create_model_takes_it(self):
-        for field, value, expected in (("settings.mesh.repair", "true", 'settings={"mesh": {"repair": True}}'),
-                                       ("settings.metres_per_unit", "1", 'settings={"metres_per_unit": 1}'),
-                                       ("max_frequency_hz", "5000", "max_frequency_hz=5000")):
-            info = error_pb2.ErrorInfo(reason="INVALID", message="x", remedies=[{"field": field, "value": value}])
-            self.assertEqual(carillon.errors.from_info(info).message,
-                             f"x; it may help to call create_model with {expected}")
-            # The words can be pasted into a call, which refuses no name of them.
-            with self.assertRaises(carillon.ServerUnavailable):
-                self.c.create_model(MESH, "oak", **eval(f"dict({expected})"))
+    def test_a_refusal_is_told_as_the_daemon_wrote_it_with_the_first_remedy(self):
+        info = error_pb2.ErrorInfo(reason="INVALID", message="step_s is 0; say",
+                                   remedies=[{"field": "settings.mesh.repair", "value": "true"}])
+        self.assertEqual(carillon.errors.from_info(info).message,
+                         "step_s is 0; say; it may help to set settings.mesh.repair to true")
 
 
 class ErrorsTest(unittest.TestCase):
@@ -399,16 +336,14 @@ class ShortFormsTest(MessagesTest):
         model = carillon.Model(self.c, summary)
         for item, expected in (
                 (self.c, "<Client of unix:/nowhere>"), (scene, "<Scene scenes/1 of unix:/nowhere>"),
-                (model, "<Model bell: 1 mode>"), (carillon.aio.AsyncModel(self.c, summary), "<AsyncModel bell: 1 mode>"),
-                (summary, "<ModalModelSummary bell: 1 mode, 12 nodes>"),
-                (rendering, "<RenderSummary: 4800 frames, 1 contact, peak 2 Pa>"),
+                (model, "<Model bell: 1 mode>"),
+                (carillon.aio.AsyncModel(self.c, summary), "<AsyncModel bell: 1 mode>"),
                 (trace, "<Trace: 1 object, 1 step, to 0.5 s>"),
                 (sound, "<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>"),
                 (carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(
                     handle=3, sounding_mode_count=1, lowest_frequency_hz=440, highest_frequency_hz=440)),
                  "<SoundingObject 3: 1 mode, 440.0 to 440.0 Hz>")):
             self.assertEqual(repr(item), expected)
-        self.assertIn("node_count: 12", str(summary))
         self.assertIn("<audio controls", sound._repr_html_())
 
 

@@ -14,7 +14,7 @@ START = contact_service_pb2.ContactStreamStart(scene="scenes/1", step_s=0.01)
 
 
 class SlowStub:
-    """Keeps the requests of a stream, which nobody takes before the test does, and is the daemon's answer, too: none."""
+    """Keeps the requests of a stream, which nobody takes before the test does, and is the daemon's answer: none."""
 
     def StreamContacts(self, requests):
         self.requests = requests

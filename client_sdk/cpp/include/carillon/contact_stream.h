@@ -37,8 +37,8 @@ class ContactStream {
   /// Returns the number of steps that were dropped, because too many waited.
   virtual uint64_t DroppedStepCount() const { return 0; }
 
-  /// Returns the newest answer of the daemon: the delays in seconds, and counts since the stream
-  /// was opened.
+  /// Returns the newest answer of the daemon: the delays in seconds, counts since the stream was
+  /// opened, and warnings. The client adds one, STEPS_DROPPED, if it has dropped steps.
   virtual v1::StreamContactsResponse Report() const = 0;
 
   /// Sends the steps that are waiting, ends the stream, and returns the daemon's last answer or the

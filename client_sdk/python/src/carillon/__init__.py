@@ -13,7 +13,7 @@ whose `reason` programs can act upon.
 """
 
 from carillon import forks  # before gRPC is imported
-from carillon import aio, summaries
+from carillon import aio
 from carillon.address import default_server
 from carillon.client import Client, connect
 from carillon.contacts import Contacts, Forces, Impulses, Poses, striker
@@ -28,8 +28,6 @@ from carillon.sound import Sound
 from carillon.streams import ContactStream
 from carillon.traces import Trace
 from carillon.version import __version__
-
-summaries.shorten()
 
 __all__ = ["CarillonError", "Client", "ContactStream", "ContactWarning", "Contacts", "Forces", "Impulses", "Job",
            "LabelWarning", "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject",

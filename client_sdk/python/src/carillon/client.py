@@ -157,7 +157,8 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording])
         return [self._scene_kind(self, item.name) for item in answer.scenes]
 
     @call
-    async def render(self, /, trace: Trace | str | os.PathLike[str], *, normalize: bool = False, **settings: Any) -> Sound:
+    async def render(self, /, trace: Trace | str | os.PathLike[str], *, normalize: bool = False,
+                     **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time. `settings` are fields of RenderSettings:
         sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
         0.9. A sound that peaks below -40 dB of full scale, or that the limiter changed, is then rendered again with a

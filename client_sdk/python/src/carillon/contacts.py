@@ -133,10 +133,6 @@ def to_frame(name: Optional[Frame]) -> contact_pb2.Frame:
     return checks.choice(contact_pb2.Frame, "FRAME_", "frame", name)
 
 
-def frame_in_words(frame: contact_pb2.Frame) -> str:
-    return errors.SCENE_FRAME if frame == contact_pb2.FRAME_SCENE else "each object's own frame"
-
-
 def to_pulse_shape(name: Optional[PulseShape]) -> contact_pb2.PulseShape:
     return checks.choice(contact_pb2.PulseShape, "PULSE_SHAPE_", "pulse_shape", name)
 

@@ -121,8 +121,8 @@ class items(Generic[P, Result]):
 
 
 def _bound(function: Callable[..., Any], run: Callable[[Any], Any], item: Any, owner: Any) -> Any:
-    """The function as a method of the item, or, without an item, of its class. Of a class that both faces share it is the
-    coroutine function itself, by which one call awaits another: await SceneCalls.delete(self)."""
+    """The function as a method of the item, or, without an item, of its class. Of a class that both faces share it is
+    the coroutine function itself, by which one call awaits another: await SceneCalls.delete(self)."""
     if not getattr(owner, "is_awaited", True):
         plain = function
 

@@ -107,5 +107,5 @@ def to_mesh_file(mesh: Any) -> MeshFile:
 def _table(values: Any, kind: Any, name: str, meaning: str) -> numpy.ndarray:
     table = numpy.asarray(values, dtype=kind)
     if table.ndim != 2 or table.shape[1] != 3:
-        raise CarillonError("MESH_SHAPE_WRONG", f"{name} has the shape {table.shape}; it must be N x 3: {meaning}")
+        raise ValueError(f"{name} has the shape {table.shape}; it must be N x 3: {meaning}")
     return table

@@ -109,8 +109,7 @@ class ModelCalls:
         body = trace.add(self, material, size=size, gain=gain)
         trace.step(0.0, impulses=strike_of(body, point, impulse, duration, striker))
         settings = {"tail_s": seconds, "sample_rate_hz": sample_rate_hz}
-        with errors.in_names(tail_s="seconds"):
-            return await rendering.render(self.client, trace, settings)
+        return await rendering.render(self.client, trace, settings)
 
     @call
     async def wait_for_transfer(self, timeout: Optional[float] = None, *,

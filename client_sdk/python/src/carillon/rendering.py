@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy
 
-from carillon import checks, contacts, errors, job_calls, summaries
+from carillon import checks, errors, job_calls
 from carillon.connection import Connection
 from carillon.sound import Sound
 from carillon.traces import Trace
@@ -53,8 +53,10 @@ async def _render(connection: Connection, trace: Trace, given: dict[str, Any]) -
             summary = answer.summary
     if summary.rejected_count:
         raise errors.from_info(summary.last_rejection)
-    summaries.refuse_without_contacts(summary)
-    errors.warn_of_contacts(summary.findings, contacts.frame_in_words(trace.header.frame), summary.accepted_count)
+    for warning in summary.warnings:
+        if warning.id == "TRACE_EMPTY":
+            raise errors.CarillonError(warning.id, warning.text)
+    errors.warn_of_contacts(summary.warnings)
     if summary.paper_coupling_object_count:
         await _warn_of_transfers(connection, {item.modal_model for item in trace.objects})
     samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)

@@ -51,7 +51,7 @@ class ObjectCalls(Generic[AnyStream]):
         await StreamCalls.close(stream, warn=False)
         if stream.rejection:
             raise stream.rejection
-        errors.warn_of_contacts(stream.findings, "the object's own frame")
+        errors.warn_of_contacts(stream.warnings)
 
     @call
     async def update(self, *, material: Optional[materials.Material] = None, size: Optional[float] = None,
@@ -213,8 +213,8 @@ class Scene(BlockingBlock, SceneCalls[SoundingObject, ContactStream, Recording, 
 
 
 class AsyncScene(AwaitedBlock, SceneCalls[AsyncObject, AsyncContactStream, AsyncRecording, AsyncTraceRecording]):
-    """A scene, whose methods are those of Scene, awaited, except `stream` and `recording_contacts`; as a context manager
-    it is deleted at the end."""
+    """A scene, whose methods are those of Scene, awaited, except `stream` and `recording_contacts`; as a context
+    manager it is deleted at the end."""
 
     _object_kind, _stream_kind = AsyncObject, AsyncContactStream
     _recording_kind, _trace_recording_kind = AsyncRecording, AsyncTraceRecording

@@ -16,7 +16,7 @@ from carillon import checks, contacts, errors
 from carillon.connection import Connection
 from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
 from carillon.faces import AwaitedBlock, Block, BlockingBlock, call, finished, iterated
-from carillon.v1 import contact_pb2, contact_service_pb2
+from carillon.v1 import contact_pb2, contact_service_pb2, warning_pb2
 
 # Steps that may wait for the network before the oldest is dropped.
 MOST_WAITING = 4096
@@ -41,19 +41,18 @@ class _OpenStreams:
     def warn(self) -> None:
         for stream in list(self.streams):
             errors.warn_of_open_stream(stream._start.scene)
-            stream._warn()
+            errors.warn_of_contacts(stream.warnings)
+            stream._finish()
 
 
 _open_streams = _OpenStreams()
 
 
 class StreamCalls(Block):
-    """Sends the contacts of each step without waiting for the daemon. `report` is the newest answer, with the counts so
-    far. It counts an impulse as accepted before it sounds: one that is due after the scene is deleted is never heard,
-    for which `report.ahead_s` says how long to wait after the end. `dropped_step_count` steps were not sent: the oldest
-    ones, when more than 4096 waited. At the end of the block one ContactWarning tells of contacts that were late
-    (`late_count`), lost or rejected and of time that was mapped anew (`remap_count`), and another of contacts that lie
-    far from their objects."""
+    """Sends the contacts of each step without waiting for the daemon. `report` is the newest answer, with the counts
+    so far. It counts an impulse as accepted before it sounds: one that is due after the scene is deleted is never
+    heard, for which `report.ahead_s` says how long to wait after the end. `dropped_step_count` steps were not sent: the
+    oldest ones, when more than 4096 waited. At the end of the block a ContactWarning tells of each of `warnings`."""
 
     _steps: Any
     _call: Any
@@ -70,8 +69,19 @@ class StreamCalls(Block):
 
     @property
     def findings(self) -> contact_pb2.ContactFindings:
-        """What the daemon found out about the contacts so far, such as blow_count and distant_point_count."""
+        """What the daemon found out about the contacts so far, such as blow_count."""
         return self.report.findings
+
+    @property
+    def warnings(self) -> list[warning_pb2.Warning]:
+        """What was probably not meant about the contacts so far."""
+        told = list(self.report.warnings)
+        if self.dropped_step_count:
+            count = checks.counted(self.dropped_step_count, "step")
+            told.append(warning_pb2.Warning(
+                id="STEPS_DROPPED", count=self.dropped_step_count, text=f"{count} not sent, because too many waited "
+                "for the network; send fewer or smaller steps in one second"))
+        return told
 
     @property
     def rejection(self) -> Optional[errors.CarillonError]:
@@ -124,12 +134,8 @@ class StreamCalls(Block):
         if self._error:
             raise self._error
         if warn:
-            self._warn()
+            errors.warn_of_contacts(self.warnings)
         return self.report
-
-    def _warn(self) -> None:
-        """Warns of contacts that did not sound as the caller meant."""
-        errors.warn_of_stream(self.report, contacts.frame_in_words(self._start.frame), self.dropped_step_count)
 
     def _finish(self) -> None:
         self._is_closed = True

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/convert/contact_warnings.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace carillon {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+/// The id, the count and the figures of each warning.
+struct Told {
+  std::string id;
+  uint64_t count = 0;
+  std::map<std::string, double> figures;
+  bool operator==(const Told&) const = default;
+};
+
+std::vector<Told> ToldBy(const google::protobuf::RepeatedPtrField<v1::Warning>& warnings) {
+  std::vector<Told> told;
+  for (const v1::Warning& warning : warnings) {
+    EXPECT_FALSE(warning.text().empty()) << warning.id();
+    told.push_back(
+        {warning.id(), warning.count(), {warning.figures().begin(), warning.figures().end()}});
+  }
+  return told;
+}
+
+std::vector<Told> WarningsOf(const IntakeFindings& findings,
+                             v1::StreamContactsResponse report = {}) {
+  AddWarnings(findings, report);
+  return ToldBy(report.warnings());
+}
+
+TEST(ContactWarnings, AStreamThatSoundedAsMeantHasNone) {
+  v1::StreamContactsResponse report;
+  report.set_accepted_count(7);
+  report.set_scheduling_delay_s(0.1);
+  report.set_ahead_s(0.35);
+  const IntakeFindings findings{.engine = {.blow_count = 4, .load_count = 90},
+                                .largest_distance_m = 0.1,
+                                .zero_impulse_count = 80,
+                                .largest_speed_change_m_per_s = 3};
+  EXPECT_THAT(WarningsOf(findings, report), IsEmpty());
+}
+
+TEST(ContactWarnings, EachFactHasAWarningWithItsCountAndFigures) {
+  v1::StreamContactsResponse report;
+  report.set_late_count(1);
+  report.set_scheduling_delay_s(0.02);
+  report.set_remap_count(2);
+  report.set_dropped_count(3);
+  report.set_rejected_count(1);
+  report.set_ahead_s(0.28);
+  report.mutable_last_rejection()->set_reason("POINT_NOT_FINITE");
+  const IntakeFindings findings{.engine = {.blow_count = 1, .changed_partner_count = 11},
+                                .distant_point_count = 5,
+                                .largest_distance_m = 0.5,
+                                .regular_gap_s = 1.0 / 120,
+                                .fast_impulse_count = 2,
+                                .largest_speed_change_m_per_s = 480,
+                                .standing_step_count = 10};
+  EXPECT_THAT(
+      WarningsOf(findings, report),
+      ElementsAre(Told{"CONTACTS_LATE", 1, {{"scheduling_delay_s", 0.02}}},
+                  Told{"TIME_REMAPPED", 2, {}}, Told{"SIMULATION_AHEAD", 0, {{"ahead_s", 0.28}}},
+                  Told{"CONTACTS_DROPPED", 3, {}}, Told{"CONTACTS_REJECTED", 1, {}},
+                  Told{"STEP_TOO_SHORT", 0, {{"regular_gap_s", 1.0 / 120}}},
+                  Told{"TIME_STANDS", 10, {}}, Told{"PARTNERS_CHANGE", 11, {}},
+                  Told{"IMPULSES_TOO_FAST", 2, {{"largest_speed_change_m_per_s", 480}}},
+                  Told{"POINTS_DISTANT", 5, {{"largest_distance_m", 0.5}}}));
+}
+
+TEST(ContactWarnings, ImpulsesOfZeroAreToldOnlyIfNoOthersSounded) {
+  const auto told = [&](uint64_t load_count, uint64_t accepted_count, uint64_t blow_count) {
+    v1::StreamContactsResponse counted;
+    counted.set_accepted_count(accepted_count);
+    return !WarningsOf({.engine = {.blow_count = blow_count, .load_count = load_count},
+                        .zero_impulse_count = 12},
+                       counted)
+                .empty();
+  };
+  EXPECT_TRUE(told(12, 0, 0));   // engine's contacts
+  EXPECT_TRUE(told(0, 12, 0));   // impacts on one object
+  EXPECT_TRUE(told(0, 24, 0));   // impacts on two objects
+  EXPECT_FALSE(told(13, 0, 0));  // a load sounded
+  EXPECT_FALSE(told(0, 25, 0));  // an impact sounded
+  EXPECT_FALSE(told(12, 1, 1));  // a blow sounded
+}
+
+TEST(ContactWarnings, ARenderingHasThoseAboutItsContacts) {
+  v1::RenderSummary empty;
+  AddWarnings({}, empty);
+  EXPECT_THAT(ToldBy(empty.warnings()), ElementsAre(Told{"TRACE_EMPTY", 0, {}}));
+  v1::RenderSummary heard;
+  heard.set_peak(0.1);  // of contact forces
+  AddWarnings({}, heard);
+  EXPECT_THAT(ToldBy(heard.warnings()), IsEmpty());
+  v1::RenderSummary summary;
+  summary.set_rejected_count(1);  // which ends the rendering in each client
+  AddWarnings({.engine = {.blow_count = 1}, .distant_point_count = 1, .largest_distance_m = 2},
+              summary);
+  EXPECT_THAT(ToldBy(summary.warnings()),
+              ElementsAre(Told{"POINTS_DISTANT", 1, {{"largest_distance_m", 2}}}));
+}
+
+}  // namespace
+}  // namespace carillon
