@@ -144,10 +144,7 @@ class ClipRenderer {
     while (true) {
       absl::Status status = TryRenderFile(path, settings, form, record);
       const std::string reason = status.ok() ? "" : ToErrorInfo(status).reason();
-      if (reason != "TOO_MANY_RENDERINGS" && reason != "RENDERING_MEMORY_FULL" &&
-          reason != "CLIENT_LIMIT_REACHED") {
-        return status;
-      }
+      if (reason != "TOO_MANY_CALLS" && reason != "CLIENT_LIMIT_REACHED") return status;
       std::this_thread::sleep_for(kPause);
     }
   }

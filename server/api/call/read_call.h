@@ -17,7 +17,7 @@ namespace carillon {
 
 /// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
 /// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
-/// A call with bounds ends with UPLOAD_IDLE when its client is silent for too long, or sends less
+/// A call with bounds ends with CLIENT_IDLE when its client is silent for too long, or sends less
 /// than 8 KiB for each second in which the call has waited for it.
 template <typename Request, typename Response, typename Sink>
 class ReadCall final : public ClientStream<Request>, public IdleCall {
@@ -43,13 +43,13 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
     const double limit_s = std::chrono::duration<double>(limit).count();
     if (wait_->EndIfLonger(limit)) {
       return this->End(
-          Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
+          Refusal(absl::StatusCode::kDeadlineExceeded, "CLIENT_IDLE",
                   absl::StrCat("nothing was sent for ", limit_s,
                                " s, and nothing was stored: send it again without pauses")));
     }
     const std::chrono::seconds earned(byte_count_ / kLeastBytesPerSecond);
     if (!wait_->EndIfAllLonger(limit + earned)) return;
-    this->End(Refusal(absl::StatusCode::kDeadlineExceeded, "UPLOAD_IDLE",
+    this->End(Refusal(absl::StatusCode::kDeadlineExceeded, "CLIENT_IDLE",
                       absl::StrCat("it took over ", limit_s,
                                    " s longer than at 8 KiB a second, and nothing was stored: "
                                    "send it again over a faster connection")));

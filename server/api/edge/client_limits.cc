@@ -7,7 +7,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/block_broadcast.h"
-#include "server/base/physical_memory.h"
+#include "server/base/usable_memory.h"
 #include "server/scene/scene_registry.h"
 #include "server/synthesis/mixer.h"
 
@@ -16,10 +16,8 @@ namespace {
 
 struct Bound {
   const char* name;
-  size_t whole;  ///< limit of all clients together
-  const char* reason =
-      nullptr;  ///< of a refusal at this limit, unless the caller counts the things
-  const char* all_taken = "";
+  size_t whole;                ///< limit of all clients together
+  const char* all_taken = "";  ///< empty if the caller counts the things
 };
 
 Bound BoundOf(Holding holding) {
@@ -31,25 +29,25 @@ Bound BoundOf(Holding holding) {
     case Holding::kListener:
       return {"listeners", BlockBroadcast::kMaxListenerCount};
     case Holding::kUpload:
-      return {"uploads", kMaxUploadCount, "TOO_MANY_UPLOADS", "uploads and imports run"};
+      return {"uploads", kMaxUploadCount, "uploads and imports run"};
     case Holding::kExport:
-      return {"exports", kMaxExportCount, "TOO_MANY_EXPORTS", "exports run"};
+      return {"exports", kMaxExportCount, "exports run"};
     case Holding::kBackup:
-      return {"backups", kMaxBackupCount, "TOO_MANY_BACKUPS", "backups are being made"};
+      return {"backups", kMaxBackupCount, "backups are being made"};
     case Holding::kRenderingMib:
-      return {"MiB of renderings", MostRenderingMib(), "RENDERING_MEMORY_FULL",
-              "MiB are held by renderings"};
+      return {"MiB of renderings", MostRenderingMib(), "MiB are held by renderings"};
     case Holding::kRendering:
       break;
   }
-  return {"renderings", kMaxRenderingCount, "TOO_MANY_RENDERINGS", "traces are being rendered"};
+  return {"renderings", kMaxRenderingCount, "traces are being rendered"};
 }
 
 }  // namespace
 
 size_t MostRenderingMib() {
   constexpr uint64_t kMost = 2048;
-  return static_cast<size_t>(std::min(kMost, (PhysicalBytes() / 4) >> 20U));
+  static const auto most = static_cast<size_t>(std::min(kMost, (UsableMemoryBytes() / 4) >> 20U));
+  return most;
 }
 
 ClientPlace::~ClientPlace() {
@@ -83,8 +81,8 @@ absl::Status ClientLimits::Add(Holding holding, const std::string& client, size_
   const Bound bound = BoundOf(holding);
   const MutexLock lock(&mutex_);
   auto& held = held_[static_cast<size_t>(holding)];
-  if (bound.reason != nullptr && CountAll(holding) + count > bound.whole) {
-    return Refusal(absl::StatusCode::kResourceExhausted, bound.reason,
+  if (*bound.all_taken != 0 && CountAll(holding) + count > bound.whole) {
+    return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CALLS",
                    absl::StrCat(bound.whole, " ", bound.all_taken, ": try again when one is done"));
   }
   const auto found = held.find(client);

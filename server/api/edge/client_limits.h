@@ -37,8 +37,8 @@ inline constexpr size_t kHoldingCount = 8;
 /// Greatest number of traces that are rendered at a time.
 inline constexpr size_t kMaxRenderingCount = 8;
 
-/// Returns the memory that all renderings together may hold: a quarter of the machine's, but at
-/// most 2 GiB.
+/// Returns the memory that all renderings together may hold: a quarter of what the daemon may use
+/// (UsableMemoryBytes), but at most 2 GiB.
 size_t MostRenderingMib();
 
 /// Greatest number of uploads of meshes and imports of models at a time.
@@ -95,9 +95,8 @@ class ClientLimits {
   explicit ClientLimits(double share) : share_(share) {}
 
   /// Takes a place for a client. The place must not outlive the ClientLimits. Errors:
-  /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_RENDERINGS, RENDERING_MEMORY_FULL,
-  /// TOO_MANY_UPLOADS, TOO_MANY_EXPORTS, TOO_MANY_BACKUPS: all clients together have reached the
-  /// greatest number at a time).
+  /// ResourceExhausted (CLIENT_LIMIT_REACHED; TOO_MANY_CALLS: all clients together have reached the
+  /// greatest number of uploads, exports, backups or renderings, or of their memory, at a time).
   absl::StatusOr<ClientPlace> Take(Holding holding, const std::string& client);
 
   /// Checks that a client that holds `held` of `whole` things may have `more` of them. `name` names

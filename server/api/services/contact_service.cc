@@ -155,7 +155,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   absl::Status Step(const v1::ContactStep& step) {
     if (!stream_) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "STREAM_NOT_STARTED",
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                      "the first request of a contact stream must be start");
     }
     if (recording_.active()) recording_.BeginStep();

@@ -48,7 +48,7 @@ class RenderCall final : public BidiStream<v1::RenderRequest, v1::RenderResponse
     if (!wait_.EndIfLonger(limit)) return;
     // A call cannot be finished while a message is being sent.
     if (writes_) return context_.TryCancel();
-    End(Refusal(absl::StatusCode::kDeadlineExceeded, "RENDERING_IDLE",
+    End(Refusal(absl::StatusCode::kDeadlineExceeded, "CLIENT_IDLE",
                 absl::StrCat("nothing was sent for ", std::chrono::duration<double>(limit).count(),
                              " s: send the trace without pauses")));
   }

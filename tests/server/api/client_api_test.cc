@@ -128,7 +128,7 @@ TEST_F(ClientApi, ARenderingWhoseClientSaysNothingEnds) {
   call->Write(request);
   v1::RenderResponse response;
   EXPECT_FALSE(call->Read(&response));
-  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "RENDERING_IDLE");
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
   while (server().clients().renderings > 0) {
   }
 }
@@ -140,7 +140,7 @@ TEST_F(ClientApi, AnUploadWhoseClientSaysNothingEndsAndStoresNothing) {
   v1::UploadMeshRequest request;
   request.set_data("the first half");
   call->Write(request);
-  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "UPLOAD_IDLE");
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
 }
 
 TEST_F(ClientApi, AnUploadThatTricklesEnds) {
@@ -150,7 +150,7 @@ TEST_F(ClientApi, AnUploadThatTricklesEnds) {
   v1::UploadMeshRequest request;
   request.set_data("v");
   while (call->Write(request)) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "UPLOAD_IDLE");
+  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
 }
 
 TEST_F(ClientApi, OneClientHasAShareOfAllUploadsAndOthersHaveTheirs) {
@@ -238,8 +238,8 @@ TEST_F(ClientApi, RenderingsThatSayNothingLeaveRoomForOthers) {
     }
     reasons.push_back(ErrorOf(call->Finish()).reason());
   }
-  EXPECT_THAT(reasons, testing::UnorderedElementsAre("RENDERING_IDLE", "RENDERING_IDLE",
-                                                     "CLIENT_LIMIT_REACHED"));
+  EXPECT_THAT(reasons,
+              testing::UnorderedElementsAre("CLIENT_IDLE", "CLIENT_IDLE", "CLIENT_LIMIT_REACHED"));
 }
 
 }  // namespace

@@ -269,7 +269,7 @@ TEST_F(SceneApi, StepsOfOneMessageAreTakenAsIfEachCameAlone) {
   const grpc::Status refused = Exchange({Start(scene), together}, last);
   ExpectRefused(refused, grpc::INVALID_ARGUMENT, "INVALID_STREAM");
   EXPECT_THAT(refused.error_message(), testing::HasSubstr("at step 150"));
-  ExpectRefused(Exchange({together}, last), grpc::INVALID_ARGUMENT, "STREAM_NOT_STARTED");
+  ExpectRefused(Exchange({together}, last), grpc::INVALID_ARGUMENT, "INVALID_STREAM");
 }
 
 TEST_F(SceneApi, TheFirstAnswerComesBeforeAnyStep) {
@@ -296,7 +296,7 @@ TEST_F(SceneApi, AStreamOutOfOrderIsRefused) {
   v1::StreamContactsRequest no_step_s = Start(scene);
   no_step_s.mutable_start()->clear_step_s();
   v1::StreamContactsResponse last;
-  ExpectRefused(Exchange({step}, last), grpc::INVALID_ARGUMENT, "STREAM_NOT_STARTED");
+  ExpectRefused(Exchange({step}, last), grpc::INVALID_ARGUMENT, "INVALID_STREAM");
   ExpectRefused(Exchange({Start("scenes/77")}, last), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
   ExpectRefused(Exchange({Start(scene), Start(scene)}, last), grpc::INVALID_ARGUMENT,
                 "INVALID_STREAM");

@@ -112,7 +112,7 @@ TEST(ClientLimits, UploadsOfAllClientsTogetherAreBounded) {
     places.push_back(*limits.Take(Holding::kUpload, std::to_string(i)));
   }
   EXPECT_THAT(limits.Take(Holding::kUpload, "late").status().ToString(),
-              testing::HasSubstr("TOO_MANY_UPLOADS"));
+              testing::HasSubstr("TOO_MANY_CALLS"));
   places.pop_back();
   EXPECT_TRUE(limits.Take(Holding::kUpload, "late").ok());
 }
@@ -130,7 +130,7 @@ TEST(ClientLimits, TheMemoryOfAllRenderingsIsBounded) {
   EXPECT_EQ(first.most(), half);
   EXPECT_TRUE(second.Grow(half).ok());
   ClientPlace third(limits, kMib, "c");
-  EXPECT_THAT(third.Grow(2).ToString(), testing::HasSubstr("RENDERING_MEMORY_FULL"));
+  EXPECT_THAT(third.Grow(2).ToString(), testing::HasSubstr("TOO_MANY_CALLS"));
   first = ClientPlace();
   EXPECT_TRUE(third.Grow(2).ok());
   EXPECT_EQ(limits.count(kMib), half + 2);
