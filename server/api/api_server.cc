@@ -64,8 +64,8 @@ std::chrono::nanoseconds Duration(double seconds) {
       std::chrono::duration<double>(seconds));
 }
 
-/// Returns the number of threads that take large steps of contact streams. One client may occupy
-/// half of them.
+/// Returns the number of threads that take the steps of contact streams. One client may occupy half
+/// of them.
 int StepThreadCount() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
 absl::Status Unready(absl::string_view reason, absl::string_view message) {
@@ -154,7 +154,7 @@ struct ApiServer::State {
                   .clock = rooms.clock,
                   .owners = owners,
                   .reception = reception,
-                  .large_steps = large_steps}),
+                  .steps = steps}),
         audio({.version = settings.version,
                .output = rooms.output,
                .scenes = rooms.scenes,
@@ -215,7 +215,7 @@ struct ApiServer::State {
   // The pools end before the turns and chores, which their tasks use.
   Chore keep_clients{call_pool, [this] { KeepClients(); }};
   Chore keep_database{write_pool, [this] { database_keeper.Look(); }};
-  FairTurns large_steps{step_pool, StepThreadCount()};
+  FairTurns steps{step_pool, StepThreadCount()};
   FairTurns adding{call_pool, kAddingThreadCount};
   /// One thread, so that the other is left for renderings.
   FairTurns copying{background_pool, 1};

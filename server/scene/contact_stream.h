@@ -60,9 +60,6 @@ class ContactStream {
     return intake_.step_count() > 0 ? std::optional(intake_.mapping().first_frame) : std::nullopt;
   }
 
-  /// Returns the number of the scene's objects.
-  size_t object_count() const { return scene_->object_count(); }
-
   /// Returns the time from the mixer's frame to the newest step's, seconds.
   double ahead_s() const { return intake_.ahead_s(); }
 

@@ -54,7 +54,7 @@ class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
     if (!GoesOn()) return;
-    if (ok) return RunReading(bytes_.Length(), [this] { ReadRequest(); });
+    if (ok) return RunReading([this] { ReadRequest(); });
     this->Run([this] {
       Continue([this] {
         AllRead();
@@ -79,13 +79,10 @@ class StreamReader : public Reactor {
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
-  /// Runs the step that parses a request of this size and passes it to RunTaking. A call may choose
-  /// other threads for some requests. Requests are still taken one at a time and in order, because
-  /// the next request is read after the last step.
-  virtual void RunReading(size_t, std::function<void()> step) { this->Run(std::move(step)); }
-
-  /// Runs the step that takes the request, and is called by the step of RunReading.
-  virtual void RunTaking(const Request&, const std::function<void()>& step) { step(); }
+  /// Runs the step that parses a request and takes it. A call may choose other threads than those
+  /// of its pool. Requests are still taken one at a time and in order, because the next request is
+  /// read after the last step.
+  virtual void RunReading(std::function<void()> step) { this->Run(std::move(step)); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
   /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's
@@ -102,19 +99,12 @@ class StreamReader : public Reactor {
   void ReadRequest() {
     Continue([this] {
       if (gone()) return absl::CancelledError("the client has gone");
-      is_large_ = bytes_.Length() > kMostKeptBytes;
+      const bool is_large = bytes_.Length() > kMostKeptBytes;
       const grpc::Status parsed =
           grpc::SerializationTraits<Request>::Deserialize(&bytes_, &request_);
       if (!parsed.ok()) return Malformed();
-      RunTaking(request_, [this] { TakeRequest(); });
-      return absl::OkStatus();
-    });
-  }
-
-  void TakeRequest() {
-    Continue([this] {
       RETURN_IF_ERROR(Take(request_));
-      if (is_large_) Request().Swap(&request_);
+      if (is_large) Request().Swap(&request_);
       StartReading();
       return absl::OkStatus();
     });
@@ -135,7 +125,6 @@ class StreamReader : public Reactor {
 
   grpc::ByteBuffer bytes_;
   Request request_;
-  bool is_large_ = false;
 };
 
 /// Whether a call has a message to send.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/services/contact_service.h"
 
+#include <grpcpp/alarm.h>
+
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -26,29 +28,19 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 /// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
-/// Greatest size of a message, and greatest number of rows of a step, that gRPC's thread takes at
-/// once. gRPC has few threads, and all calls wait while these are busy. Parsing a message takes up
-/// to 60 ns for each of its bytes, and a row takes up to 6 us.
-constexpr size_t kMostBytesAtOnce = size_t{24} << 10;
-constexpr size_t kMostRowsAtOnce = 256;
-/// The same for a client that has used up its time on gRPC's threads. This message takes no longer
-/// than gRPC's own work for it.
-constexpr size_t kFewBytes = size_t{1} << 10;
-constexpr size_t kFewRows = 16;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
 /// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, ContactClients& clients,
+  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
               const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
       : StreamWriter(nullptr),
         daemon_(daemon),
-        recorders_(clients.recorders),
+        recorders_(recorders),
         context_(context),
         caller_(std::move(caller)),
-        place_(std::move(place)),
-        budget_(clients.budgets.Of(caller_.client)) {
+        place_(std::move(place)) {
     StartWriting();
     StartReading();
   }
@@ -72,63 +64,14 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   bool gone() const override { return context_.IsCancelled(); }
 
-  void RunReading(size_t byte_count, std::function<void()> step) override {
-    if (byte_count <= kFewBytes) {
-      turn_ = Turn::kFree;
-      return step();
-    }
-    if (byte_count <= kMostBytesAtOnce && budget_->Allows(daemon_.clock.Monotonic())) {
-      turn_ = Turn::kPaid;
-      return Pay(step);
-    }
-    if (!budget_->Hold(byte_count)) {
-      return Refuse(
-          Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
-                  "large messages of this client, of more than 64 MiB together, wait to be "
-                  "taken: send steps with fewer contacts, or more slowly"));
-    }
-    RunInPool([budget = budget_, byte_count, step = std::move(step)] {
-      budget->Release(byte_count);
-      step();
-    });
-  }
-
-  void RunTaking(const v1::StreamContactsRequest& request,
-                 const std::function<void()>& step) override {
-    // A step takes time even without rows.
-    size_t row_count =
-        CountRowsOf(request.step()) + static_cast<size_t>(request.steps().steps_size());
-    for (const v1::ContactStep& one : request.steps().steps()) row_count += CountRowsOf(one);
-    if (turn_ == Turn::kInPool || row_count <= kFewRows) return step();
-    if (row_count > kMostRowsAtOnce) return RunInPool(step);
-    if (turn_ == Turn::kPaid) return step();
-    if (!budget_->Allows(daemon_.clock.Monotonic())) return RunInPool(step);
-    Pay(step);
-  }
-
-  /// Returns the number of rows, in which each object that hears a move of the listener counts.
-  size_t CountRowsOf(const v1::ContactStep& step) const {
-    return CountRows(step) + (stream_ && step.has_listener() ? stream_->object_count() : 0);
-  }
-
-  /// Runs the step on this thread, which is one of gRPC's, and spends the client's budget.
-  void Pay(const std::function<void()>& step) {
-    Clock& clock = daemon_.clock;
-    const std::shared_ptr<StepBudget> budget = budget_;  // the call may be deleted during the step
-    const std::chrono::nanoseconds begin = clock.Monotonic();
-    step();
-    budget->Spend(clock.Monotonic() - begin);
-  }
-
-  void RunInPool(std::function<void()> step) {
-    turn_ = Turn::kInPool;
-    daemon_.large_steps.Run(caller_.client, std::move(step));
+  void RunReading(std::function<void()> step) override {
+    daemon_.steps.Run(caller_.client, std::move(step));
   }
 
   void AllRead() override {
     if (stream_) stream_->intake().Finish();
     recording_.End();
-    daemon_.reception.pool.Run([this] { Settle(); });
+    Settle();
   }
 
   void Refuse(const absl::Status& status) override { CloseWith(status); }
@@ -166,10 +109,14 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     return absl::OkStatus();
   }
 
-  /// Waits until the mixer has taken all impulses, so that the last counts are final.
+  /// Ends the call once the mixer has taken all impulses, so that the last counts are final. No
+  /// thread waits meanwhile.
   void Settle() {
-    for (int i = 0; stream_ && !stream_->settled() && i < kMostSettlePeriods; ++i) {
-      daemon_.clock.SleepUntil(daemon_.clock.Monotonic() + kSettlePeriod);
+    if (stream_ && !stream_->settled() && settle_count_++ < kMostSettlePeriods) {
+      settle_timer_ = std::make_unique<grpc::Alarm>();
+      settle_timer_->Set(std::chrono::system_clock::now() + kSettlePeriod,
+                         [this](bool) { Settle(); });
+      return;
     }
     if (stream_) Answer();
     CloseWith(absl::OkStatus());
@@ -227,23 +174,16 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
     return answer;
   }
 
-  /// Where the request that was read last is taken.
-  enum class Turn {
-    kFree,    ///< on gRPC's thread, without spending the budget
-    kPaid,    ///< on gRPC's thread, by Pay
-    kInPool,  ///< on a thread that large_steps gives
-  };
-
   const ContactContext daemon_;
   TraceRecorders& recorders_;
-  Turn turn_ = Turn::kFree;
   StreamRecording recording_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
   const ClientPlace place_;
-  const std::shared_ptr<StepBudget> budget_;
   std::unique_ptr<ContactStream> stream_;
   std::chrono::nanoseconds answer_due_{0};
+  int settle_count_ = 0;
+  std::unique_ptr<grpc::Alarm> settle_timer_;
   Mutex mutex_;
   std::optional<v1::StreamContactsResponse> waiting_ ABSL_GUARDED_BY(mutex_);
   std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
@@ -293,7 +233,7 @@ grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordCont
       const absl::Status found = daemon_.scenes.BusOf(*scene).status();
       if (!found.ok()) scene = found;
     }
-    return new RecordCall(clients_.recorders, scene, std::move(place));
+    return new RecordCall(recorders_, scene, std::move(place));
   };
   return Open(*context, daemon_.reception, {Role::kStrike, Holding::kListener}, make);
 }
@@ -303,7 +243,7 @@ ContactService::StreamContactsRaw(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, {Role::kStrike, Holding::kContactStream},
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
-                return new ContactCall(daemon_, clients_, *context, caller, std::move(place));
+                return new ContactCall(daemon_, recorders_, *context, caller, std::move(place));
               });
 }
 

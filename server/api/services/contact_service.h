@@ -5,7 +5,6 @@
 #include "server/api/call/fair_turns.h"
 #include "server/api/call/raw_service.h"
 #include "server/api/call/reception.h"
-#include "server/api/call/step_budget.h"
 #include "server/api/edge/scene_owners.h"
 #include "server/api/services/trace_recorders.h"
 #include "server/base/clock.h"
@@ -21,13 +20,7 @@ struct ContactContext {
   Clock& clock;
   SceneOwners& owners;
   Reception reception;
-  FairTurns& large_steps;  ///< takes the steps that keep a thread busy for long
-};
-
-/// The parts of the service that several of its calls share.
-struct ContactClients {
-  TraceRecorders recorders{};
-  StepBudgets budgets{};
+  FairTurns& steps;  ///< parses and takes the messages of the streams
 };
 
 /// carillon.v1.ContactService. The objects that the constructor gets by reference must outlive the
@@ -46,7 +39,7 @@ class ContactService final : public RawService<v1::ContactService> {
       grpc::CallbackServerContext* context);
 
   const ContactContext daemon_;
-  ContactClients clients_;
+  TraceRecorders recorders_;
 };
 
 }  // namespace carillon
