@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <deque>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -17,26 +16,22 @@
 #include "server/api/call/chore.h"
 #include "server/api/call/fair_turns.h"
 #include "server/api/call/thread_pool.h"
-#include "server/api/call/timetable.h"
 #include "server/api/edge/access_control.h"
 #include "server/api/edge/certificate_end.h"
-#include "server/api/edge/client_keeper.h"
 #include "server/api/edge/client_limits.h"
-#include "server/api/edge/connection_gate.h"
-#include "server/api/edge/flood_guard.h"
+#include "server/api/edge/edge.h"
 #include "server/api/edge/grpc_log.h"
 #include "server/api/edge/idle_calls.h"
-#include "server/api/edge/listen_address.h"
 #include "server/api/edge/scene_leases.h"
 #include "server/api/edge/scene_owners.h"
-#include "server/api/edge/tls_credentials.h"
-#include "server/api/grpc_servers.h"
 #include "server/api/services/admin_service.h"
 #include "server/api/services/audio_service.h"
 #include "server/api/services/contact_service.h"
 #include "server/api/services/decomposition_service.h"
 #include "server/api/services/job_run_service.h"
 #include "server/api/services/modal_model_service.h"
+#include "server/api/services/reflection_service.h"
+#include "server/api/services/refusing_service.h"
 #include "server/api/services/scene_service.h"
 #include "server/api/services/server_service.h"
 #include "server/base/limited_log.h"
@@ -56,9 +51,6 @@ constexpr int kWriteThreadCount = 1;
 constexpr int kBackgroundThreadCount = 2;
 constexpr int kBackgroundNiceness = 10;
 
-constexpr std::chrono::milliseconds kClientPeriod(250);
-constexpr std::chrono::seconds kDatabasePeriod(1);
-
 std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
       std::chrono::duration<double>(seconds));
@@ -68,40 +60,16 @@ std::chrono::nanoseconds Duration(double seconds) {
 /// of them.
 int StepThreadCount() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
-absl::Status Unready(absl::string_view reason, absl::string_view message) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, reason, message);
-}
-
 absl::StatusOr<AccessTable> ReadAccess(const ApiSettings& settings) {
   if (settings.access_file.empty()) return AccessTable::ForThisMachine();
   return AccessTable::Read(settings.access_file);
 }
 
-absl::StatusOr<std::deque<ListenAddress>> ParseAddresses(const ApiSettings& settings) {
-  std::deque<ListenAddress> addresses;
-  for (const std::string& text : settings.addresses) {
-    ASSIGN_OR_RETURN(ListenAddress address, ParseListenAddress(text));
-    if (!address.is_local() && settings.tls.certificate.empty()) {
-      return Unready("TLS_REQUIRED",
-                     absl::StrCat(text,
-                                  " can be reached from the network, and everybody there could use "
-                                  "the daemon; give --tls-certificate and --tls-key, or listen on "
-                                  "127.0.0.1 or a Unix socket"));
-    }
-    if (!address.is_local() && settings.access_file.empty()) {
-      return Unready("ACCESS_FILE_REQUIRED",
-                     absl::StrCat(text,
-                                  " can be reached from the network; say who may do what there: "
-                                  "give --access-file"));
-    }
-    if (std::ranges::any_of(
-            addresses, [&](const ListenAddress& other) { return IsSameAddress(address, other); })) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
-                     absl::StrCat("--listen names ", text, " twice: name each address once"));
-    }
-    addresses.push_back(std::move(address));
-  }
-  return addresses;
+EdgeSettings EdgeOf(const ApiSettings& settings) {
+  return {.addresses = settings.addresses,
+          .tls = settings.tls,
+          .has_access_file = !settings.access_file.empty(),
+          .client_share = settings.client_share};
 }
 
 absl::Status CheckHead(HeadStore& heads, const ApiSettings& settings, uint32_t sample_rate_hz) {
@@ -121,16 +89,13 @@ struct ApiServer::State {
         events(rooms.clock, rooms.log_event),
         limits(settings.client_share),
         leases(rooms.clock, Duration(settings.scene_grace_s),
-               [this](const std::string& connection) { return IsOpen(connection); }),
+               [this](const std::string& connection) { return edge->IsOpen(connection); }),
         owners(access, leases, rooms.scenes),
         certificate_end(rooms.clock),
         database_keeper(rooms.database.database(),
                         [this](const absl::Status& state) { ShowDatabase(state); }),
-        client_keeper({.scenes = rooms.scenes,
-                       .owners = owners,
-                       .idle_calls = idle_calls,
-                       .idle_limit = Duration(settings.rendering_idle_s),
-                       .log = [this](const std::string& line) { client_log.Warn(line); }}),
+        idle_limit(Duration(settings.rendering_idle_s)),
+        live_scenes(rooms.scenes),
         admin({.database = rooms.database,
                .reception = reception,
                .writing = writing,
@@ -181,16 +146,12 @@ struct ApiServer::State {
   absl::Status Listen(const ApiSettings& settings);
   /// Begins to accept connections, and to look after the clients and the database.
   void Open();
-  absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> Credentials(const ListenAddress& address,
-                                                                       const ApiSettings& settings);
-
-  /// Returns whether a connection is open. A connection without a name counts as open for ever.
-  bool IsOpen(const std::string& connection) const {
-    return connection == "unix:" || gate->IsOpen(connection);
-  }
 
   /// Looks after the clients and what they need. May wait for the scenes.
   void KeepClients();
+
+  /// Ends the scenes whose leases are over.
+  void EndScenes();
 
   /// Sets the health of DecompositionService when decompositions have become possible or
   /// impossible.
@@ -211,7 +172,8 @@ struct ApiServer::State {
   IdleCalls idle_calls;
   CertificateEnd certificate_end;
   DatabaseKeeper database_keeper;
-  const ClientKeeper client_keeper;
+  const std::chrono::nanoseconds idle_limit;
+  SceneRegistry& live_scenes;
   // The pools end before the turns and chores, which their tasks use.
   Chore keep_clients{call_pool, [this] { KeepClients(); }};
   Chore keep_database{write_pool, [this] { database_keeper.Look(); }};
@@ -240,70 +202,48 @@ struct ApiServer::State {
   const std::function<void(const std::string& line)> log_error;
   const EventSink log_event;
   const std::function<absl::Status()> check_decomposition;
-  /// The credentials of each TCP address.
-  std::vector<std::shared_ptr<TlsCredentials>> tls;
-  std::optional<GrpcServers> servers;
-  std::optional<ConnectionGate> gate;
-  std::optional<FloodGuard> flood_guard;
-  /// Not on the gate's thread, because gRPC may parse a flood there when it gets a connection.
-  Timetable timetable;
+  std::vector<std::unique_ptr<grpc::Service>> reflection;
+  RefusingService refusing{
+      [this](const std::string& connection) { return edge->WhyRefused(connection); }};
+  std::optional<Edge> edge;
   std::atomic<bool> stores{true};
   std::atomic<bool> decomposes{true};
-  std::vector<std::string> addresses;
 };
 
-absl::StatusOr<std::shared_ptr<grpc::ServerCredentials>> ApiServer::State::Credentials(
-    const ListenAddress& address, const ApiSettings& settings) {
-  if (address.is_unix() || settings.tls.certificate.empty()) {
-    return grpc::InsecureServerCredentials();
-  }
-  ASSIGN_OR_RETURN(TlsFiles files, ReadTlsFiles(settings.tls));
-  certificate_end.Set(files.end_unix_s);
-  tls.push_back(std::make_shared<TlsCredentials>(std::move(files)));
-  return tls.back();
-}
-
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
-  ASSIGN_OR_RETURN(std::deque<ListenAddress> parsed, ParseAddresses(settings));
-  servers.emplace(idle_calls, clock);
-  gate.emplace(RaiseConnectionLimit(), settings.client_share, &client_log);
-  for (ListenAddress& address : parsed) {
-    ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ServerCredentials> credentials,
-                     Credentials(address, settings));
-    RETURN_IF_ERROR(gate->Listen(address, servers->AddTaker(credentials)));
-  }
-  if (!servers->Start({{admin, v1::AdminService::service_full_name()},
-                       {models, v1::ModalModelService::service_full_name()},
-                       {decompositions, v1::DecompositionService::service_full_name()},
-                       {job_runs, v1::JobRunService::service_full_name()},
-                       {scenes, v1::SceneService::service_full_name()},
-                       {contacts, v1::ContactService::service_full_name()},
-                       {audio, v1::AudioService::service_full_name()},
-                       {server_info, v1::ServerService::service_full_name()}})) {
-    return Unready("LISTEN_FAILED",
-                   "cannot serve: gRPC does not take the TLS files; see the line before");
-  }
-  for (const ListenAddress& address : parsed) addresses.push_back(address.ToString());
-  return absl::OkStatus();
+  std::vector<grpc::Service*> services = {&admin,  &models,   &decompositions, &job_runs,
+                                          &scenes, &contacts, &audio,          &server_info};
+  reflection = MakeReflectionServices(
+      {v1::AdminService::service_full_name(), v1::ModalModelService::service_full_name(),
+       v1::DecompositionService::service_full_name(), v1::JobRunService::service_full_name(),
+       v1::SceneService::service_full_name(), v1::ContactService::service_full_name(),
+       v1::AudioService::service_full_name(), v1::ServerService::service_full_name(),
+       "grpc.health.v1.Health"});
+  for (const auto& service : reflection) services.push_back(service.get());
+  edge.emplace(EdgeOf(settings), certificate_end, client_log);
+  return edge->Serve(services, refusing);
 }
 
 void ApiServer::State::Open() {
-  const auto repeat = [this](Chore& chore, Timetable::Clock::duration period) {
-    timetable.Add([&chore, period] {
-      chore.Start();
-      return period;
-    });
-  };
-  repeat(keep_clients, kClientPeriod);
-  repeat(keep_database, kDatabasePeriod);
-  flood_guard.emplace(*gate, client_log);
-  timetable.Add([this] { return flood_guard->Look(); });
-  gate->Open();
-  timetable.Start();
+  edge->Open([this] {
+    keep_clients.Start();
+    keep_database.Start();
+  });
+}
+
+void ApiServer::State::EndScenes() {
+  for (const uint64_t scene : leases.Expired()) {
+    const std::string name = live_scenes.NameOf(scene);
+    // A client may have deleted the scene meanwhile.
+    const bool ended = live_scenes.DeleteScene(scene).ok();
+    owners.Remove(scene);
+    if (ended) client_log.Warn(absl::StrCat(name, " has ended: its clients have gone"));
+  }
 }
 
 void ApiServer::State::KeepClients() {
-  client_keeper.Look();
+  EndScenes();
+  idle_calls.EndIdle(idle_limit);
   ShowWorkers(check_decomposition());
   if (const auto warning = certificate_end.WarningDue()) log(*warning);
 }
@@ -311,7 +251,7 @@ void ApiServer::State::KeepClients() {
 void ApiServer::State::ShowWorkers(const absl::Status& state) {
   const bool can = state.ok();
   if (decomposes.exchange(can) == can) return;
-  servers->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
+  edge->SetHealth(v1::DecompositionService::service_full_name(), stores && can);
   if (can) {
     log_event(Event("decompositions_possible", LogLevel::kInfo));
   } else {
@@ -321,22 +261,16 @@ void ApiServer::State::ShowWorkers(const absl::Status& state) {
 }
 
 void ApiServer::State::ShowDatabase(const absl::Status& state) {
-  servers->SetHealth(v1::ModalModelService::service_full_name(), state.ok());
+  edge->SetHealth(v1::ModalModelService::service_full_name(), state.ok());
   const bool stored = stores.exchange(state.ok());
-  servers->SetHealth(v1::DecompositionService::service_full_name(), stores && decomposes);
+  edge->SetHealth(v1::DecompositionService::service_full_name(), stores && decomposes);
   if (!state.ok()) log_error(std::string(state.message()));
   if (state.ok() && !stored) log("the database can be changed again");
 }
 
 absl::Status ApiServer::Check(const ApiSettings& settings, uint32_t sample_rate_hz) {
   RETURN_IF_ERROR(ReadAccess(settings).status());
-  ASSIGN_OR_RETURN(const std::deque<ListenAddress> addresses, ParseAddresses(settings));
-  for (const ListenAddress& address : addresses) {
-    if (address.is_unix()) RETURN_IF_ERROR(CheckSocket(address.socket_path));
-  }
-  const bool serves_tls =
-      !settings.tls.certificate.empty() && !std::ranges::all_of(addresses, &ListenAddress::is_unix);
-  if (serves_tls) RETURN_IF_ERROR(ReadTlsFiles(settings.tls).status());
+  RETURN_IF_ERROR(Edge::Check(EdgeOf(settings)));
   HeadStore heads(settings.head_file);
   return CheckHead(heads, settings, sample_rate_hz);
 }
@@ -347,8 +281,8 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
   auto state = std::make_unique<State>(settings, rooms, std::move(table));
   RETURN_IF_ERROR(CheckHead(state->heads, settings, rooms.output.format().sample_rate_hz));
   RETURN_IF_ERROR(state->Listen(settings));
-  rooms.output.ObserveDevice([&servers = *state->servers](bool plays) {
-    servers.SetHealth(v1::AudioService::service_full_name(), plays);
+  rooms.output.ObserveDevice([&edge = *state->edge](bool plays) {
+    edge.SetHealth(v1::AudioService::service_full_name(), plays);
   });
   std::unique_ptr<ApiServer> server(new ApiServer(std::move(state)));
   server->state_->Open();
@@ -357,12 +291,8 @@ absl::StatusOr<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiSettings& s
 
 absl::Status ApiServer::Reload(const ApiSettings& settings) {
   ASSIGN_OR_RETURN(AccessTable table, ReadAccess(settings));
-  TlsFiles files;
-  if (!state_->tls.empty()) {
-    ASSIGN_OR_RETURN(files, ReadTlsFiles(settings.tls));
-  }
-  for (const auto& credentials : state_->tls) credentials->Replace(files);
-  state_->certificate_end.Set(files.end_unix_s);
+  ASSIGN_OR_RETURN(const TlsFiles files, state_->edge->ReadTls(settings.tls));
+  state_->edge->ReplaceTls(files);
   state_->access.Replace(std::move(table));
   return absl::OkStatus();
 }
@@ -372,17 +302,16 @@ ApiServer::ApiServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
 void ApiServer::KeepLibrary() { grpc_init(); }
 
 ApiServer::~ApiServer() {
-  state_->timetable.Stop();
-  state_->gate->Close();
+  state_->edge->Close();
   state_->keep_clients.Stop();
   state_->keep_database.Stop();
   state_->output.ObserveDevice(nullptr);
-  state_->servers.reset();
+  state_->edge.reset();
 }
 
 ClientCounts ApiServer::clients() const {
   const ClientLimits& limits = state_->limits;
-  return {.connections = state_->gate->open_count(),
+  return {.connections = state_->edge->connection_count(),
           .contact_streams = limits.count(Holding::kContactStream),
           .listeners = limits.count(Holding::kListener),
           .renderings = limits.count(Holding::kRendering)};
@@ -394,6 +323,6 @@ std::optional<double> ApiServer::certificate_left_s() const {
   return state_->certificate_end.left_s();
 }
 
-const std::vector<std::string>& ApiServer::addresses() const { return state_->addresses; }
+const std::vector<std::string>& ApiServer::addresses() const { return state_->edge->addresses(); }
 
 }  // namespace carillon

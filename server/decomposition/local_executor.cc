@@ -25,7 +25,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/mutex.h"
-#include "server/base/physical_memory.h"
+#include "server/base/usable_memory.h"
 #include "server/decomposition/local_worker.h"
 #include "server/decomposition/work_folder.h"
 
@@ -269,7 +269,7 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorO
   if (filled.worker_count == 0) {
     filled.worker_count = std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / 2);
   }
-  if (filled.memory_budget_bytes == 0) filled.memory_budget_bytes = PhysicalBytes() / 2;
+  if (filled.memory_budget_bytes == 0) filled.memory_budget_bytes = UsableMemoryBytes() / 2;
   if (filled.memory_limit_bytes == 0) filled.memory_limit_bytes = filled.memory_budget_bytes;
   return std::make_unique<LocalExecutor>(std::move(filled), clock);
 }

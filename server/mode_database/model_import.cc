@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/base/physical_memory.h"
+#include "server/base/usable_memory.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/model_sql.h"
 
@@ -19,7 +19,7 @@ namespace {
 
 /// A model is read into memory whole when it sounds.
 absl::Status CheckSize(uint64_t array_bytes) {
-  const uint64_t most_bytes = PhysicalBytes() / 2;
+  const uint64_t most_bytes = UsableMemoryBytes() / 2;
   if (array_bytes <= most_bytes) return absl::OkStatus();
   return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
                  absl::StrCat("the arrays of the model have ", array_bytes,

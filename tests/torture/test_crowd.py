@@ -22,7 +22,7 @@ import torture
 from carillon.v1 import audio_service_pb2, material_pb2, scene_service_pb2
 from certificates import self_signed
 from http2_frames import METHOD
-from test_rapid_reset import Flood, resets
+from test_floods import Flood, resets
 
 CROWD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"], "tests", "crowd")
 GOOD, SCENES = torture.rounds(40, 1000), torture.rounds(20, 500)
@@ -146,7 +146,7 @@ class CrowdTest(torture.ServedTest):
         crowds = [self.start_crowd(BAD_CLIENTS, RUN_S, self.targets[:2]) for _ in range(BAD_CROWDS)]
         self.bad = [self.silent(socket.AF_UNIX, str(self.folder / "socket"), SILENT),
                     self.silent(socket.AF_INET, ("127.0.0.1", self.port), HALF_OPEN, HALF_HANDSHAKE)]
-        self.flood = Flood(str(self.folder / "socket"), resets, reads=True)
+        self.flood = Flood(str(self.folder / "socket"), resets)
         self.addCleanup(self.flood.stop)
         for number, crowd in enumerate(crowds):
             crowd.send_signal(signal.SIGKILL if number % 2 else signal.SIGSTOP)

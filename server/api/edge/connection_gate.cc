@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/edge/connection_gate.h"
 
+#include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <poll.h>
+#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -34,20 +35,16 @@ namespace carillon {
 namespace {
 
 constexpr size_t kMaxConnectionCount = 4096;
+/// gRPC's descriptor and the gate's duplicate.
+constexpr size_t kDescriptorsOfConnection = 2;
 /// Descriptors that the database, decompositions and devices may need, apart from the connections.
 constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
 /// This part of the places is for processes and addresses with few connections.
 constexpr size_t kKeptPart = 16;
-/// This part of the places is for the Unix sockets.
-constexpr size_t kUnixPart = 64;
-/// After the gate has looked which connections are closed, it pauses this many times as long, so
-/// that a flood of connections beyond a limit takes a small part of its time.
-constexpr int kForgettingPauses = 8;
 /// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
-/// Time between two looks at the socket files.
-constexpr std::chrono::milliseconds kLookPeriod(1000);
+constexpr size_t kEventsAtOnce = 64;
 
 absl::Status Failed(const ListenAddress& address, int error) {
   const bool in_use = error == EADDRINUSE;
@@ -97,12 +94,6 @@ void DiscardReceived(int connection) {
 
 std::chrono::steady_clock::time_point Now() { return std::chrono::steady_clock::now(); }
 
-/// Returns the inode of a descriptor, or 0 if the descriptor is closed.
-ino_t InodeOf(int descriptor) {
-  struct stat status {};
-  return fstat(descriptor, &status) == 0 ? status.st_ino : 0;
-}
-
 }  // namespace
 
 std::string SourceOfPeer(const std::string& peer) {
@@ -115,11 +106,21 @@ ConnectionGate::ConnectionGate(size_t max_connection_count, double client_share,
       client_share_(client_share),
       log_(log),
       source_of_(source_of),
-      stop_(eventfd(0, EFD_CLOEXEC)) {}
+      stop_(eventfd(0, EFD_CLOEXEC)),
+      events_(epoll_create1(EPOLL_CLOEXEC)) {
+  Await(stop_, EPOLLIN);
+}
 
 ConnectionGate::~ConnectionGate() {
   Close();
+  for (const auto& [duplicate, peer] : peers_) close(duplicate);
+  close(events_);
   close(stop_);
+}
+
+void ConnectionGate::Await(int descriptor, uint32_t events) const {
+  epoll_event event{.events = events, .data = {.fd = descriptor}};
+  epoll_ctl(events_, EPOLL_CTL_ADD, descriptor, &event);
 }
 
 void ConnectionGate::Close() {
@@ -180,26 +181,34 @@ absl::Status ConnectionGate::ListenTcp(ListenAddress& address, ConnectionTaker& 
   return bound_any ? absl::OkStatus() : Failed(address, last_error);
 }
 
-void ConnectionGate::Open() {
+void ConnectionGate::Open(std::function<void()> on_first) {
+  on_first_ = std::move(on_first);
+  for (const Door& door : doors_) Await(door.socket, EPOLLIN);
   thread_ = std::thread([this] { Run(); });
 }
 
 void ConnectionGate::Run() {
-  std::vector<pollfd> awaited{{stop_, POLLIN, 0}};
-  for (const Door& door : doors_) awaited.push_back({door.socket, POLLIN, 0});
-  const auto period = socket_files_.empty() ? -1 : static_cast<int>(kLookPeriod.count());
-  while (poll(awaited.data(), awaited.size(), period) < 0 || (awaited[0].revents & POLLIN) == 0) {
-    for (size_t i = 0; i < doors_.size(); ++i) {
-      if ((awaited[i + 1].revents & POLLIN) != 0) Accept(doors_[i]);
+  std::array<epoll_event, kEventsAtOnce> events{};
+  for (;;) {
+    const int count = epoll_wait(events_, events.data(), kEventsAtOnce, -1);
+    const auto end = events.begin() + std::max(count, 0);
+    std::vector<const Door*> ready;
+    for (auto event = events.begin(); event != end; ++event) {
+      if (event->data.fd == stop_) return;
+      const auto door = std::ranges::find(doors_, event->data.fd, &Door::socket);
+      if (door == doors_.end()) {
+        Forget(event->data.fd);
+      } else {
+        ready.push_back(&*door);
+      }
     }
-    LookAtSocketFiles();
+    // Not before, because a new duplicate may get the number of one that has ended.
+    for (const Door* door : ready) Accept(*door);
   }
 }
 
 void ConnectionGate::LookAtSocketFiles() {
-  const auto now = Now();
-  if (log_ == nullptr || now < next_look_) return;
-  next_look_ = now + kLookPeriod;
+  if (log_ == nullptr) return;
   for (WatchedFile& watched : socket_files_) {
     const bool was_in_place = std::exchange(watched.was_in_place, watched.file.IsInPlace());
     if (!was_in_place || watched.was_in_place) continue;
@@ -215,59 +224,88 @@ void ConnectionGate::Accept(const Door& door) {
   socklen_t size = sizeof address;
   const int connection = accept4(door.socket, reinterpret_cast<sockaddr*>(&address), &size,
                                  SOCK_NONBLOCK | SOCK_CLOEXEC);
-  if (connection < 0) {
+  if (connection < 0) return WaitForDescriptors(errno);
+  const int duplicate = fcntl(connection, F_DUPFD_CLOEXEC, 0);
+  if (duplicate < 0) {
     const int error = errno;
-    if (error == EAGAIN || error == ECONNABORTED || error == EINTR) return;
-    WarnOnce("", absl::StrCat("cannot accept connections (", std::generic_category().message(error),
-                              "), and new clients wait: raise the daemon's limit of descriptors "
-                              "(ulimit -n; systemd's LimitNOFILE=), or end some of its clients"));
-    std::this_thread::sleep_for(kPause);
-    return;
+    close(connection);
+    return WaitForDescriptors(error);
   }
   const std::string peer = PeerNameOf(connection, address, ++accepted_count_);
-  if (!Admit(peer, {.descriptor = connection, .inode = InodeOf(connection)})) {
+  const std::string source = source_of_(peer);
+  const Entry entry = Admit(peer, source, duplicate);
+  if (entry == Entry::kNone) {
+    close(duplicate);
     close(connection);
     return;
   }
+  Await(duplicate, EPOLLET);  // epoll always tells of the end, EPOLLHUP
   const NamedPeer named(peer);
-  door.taker->Take(connection, source_of_(peer));
+  if (entry == Entry::kRefusal) return door.taker->Refuse(connection);
+  door.taker->Take(connection, source);
 }
 
-bool ConnectionGate::Connection::is_open() const { return InodeOf(descriptor) == inode; }
+void ConnectionGate::WaitForDescriptors(int error) {
+  if (error == EAGAIN || error == ECONNABORTED || error == EINTR) return;
+  WarnOnce("", absl::StrCat("cannot accept connections (", std::generic_category().message(error),
+                            "), and new clients wait: raise the daemon's limit of descriptors "
+                            "(ulimit -n; systemd's LimitNOFILE=), or end some of its clients"));
+  std::this_thread::sleep_for(kPause);
+}
 
-bool ConnectionGate::Admit(const std::string& peer, const Connection& connection) {
-  const std::string source = source_of_(peer);
-  std::string reason;
+ConnectionGate::Entry ConnectionGate::Admit(const std::string& peer, const std::string& source,
+                                            int duplicate) {
+  std::string refusal;
+  Entry entry = Entry::kPlace;
+  bool first = false;
   {
     const MutexLock lock(&mutex_);
     const auto refused = refused_.find(source);
-    if (refused != refused_.end() && Now() < refused->second) return false;
-    reason = WhyNoPlace(source);
-    // The memory of closed connections must not grow with the number of clients that ever came.
-    const bool is_long = connections_.size() >= most_remembered_;
-    if ((is_long || !reason.empty()) && ForgetClosed()) {
-      reason = WhyNoPlace(source);
-      most_remembered_ = 2 * connections_.size() + kFewConnections;
+    if (refused != refused_.end() && Now() < refused->second) return Entry::kNone;
+    ForgetLocked(peer);  // an older connection that had the same port
+    refusal = WhyNoPlace(source);
+    if (!refusal.empty()) entry = refused_count_ < kMostRefused ? Entry::kRefusal : Entry::kNone;
+    if (entry != Entry::kNone) {
+      first = connections_.empty();
+      connections_[peer] = {.descriptor = duplicate, .refusal = refusal};
+      peers_[duplicate] = peer;
+      ++(entry == Entry::kPlace ? counts_[source] : refused_count_);
     }
-    if (reason.empty() && connections_.insert_or_assign(peer, connection).second) ++counts_[source];
   }
-  if (!reason.empty()) Tell(source, reason);
-  return reason.empty();
+  if (first) on_first_();
+  if (!refusal.empty()) {
+    WarnOnce(source, absl::StrCat("refused a new connection from ", source, ": ", refusal,
+                                  "; for 30 s further ones are refused without a line"));
+  }
+  return entry;
 }
 
-bool ConnectionGate::ForgetClosed() {
-  const auto began = Now();
-  if (began < next_forgetting_) return false;
-  std::erase_if(connections_, [](const auto& each) { return !each.second.is_open(); });
-  counts_.clear();
-  for (const auto& [peer, connection] : connections_) ++counts_[source_of_(peer)];
-  const auto ended = Now();
-  next_forgetting_ = ended + kForgettingPauses * (ended - began);
-  return true;
+void ConnectionGate::Forget(int duplicate) {
+  const MutexLock lock(&mutex_);
+  const auto peer = peers_.find(duplicate);
+  if (peer != peers_.end()) ForgetLocked(std::string(peer->second));
+}
+
+void ConnectionGate::ForgetLocked(const std::string& peer) {
+  const auto found = connections_.find(peer);
+  if (found == connections_.end()) return;
+  const int duplicate = found->second.descriptor;
+  const bool has_place = found->second.refusal.empty();
+  // gRPC may still hold its descriptor of the same connection.
+  epoll_ctl(events_, EPOLL_CTL_DEL, duplicate, nullptr);
+  close(duplicate);
+  peers_.erase(duplicate);
+  connections_.erase(found);
+  if (!has_place) {
+    --refused_count_;
+    return;
+  }
+  const auto count = counts_.find(source_of_(peer));
+  if (--count->second == 0) counts_.erase(count);
 }
 
 std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
-  const size_t all = connections_.size();
+  const size_t all = connections_.size() - refused_count_;
   if (all >= max_connection_count_) return absl::StrCat("all ", all, " places are taken");
   const auto counted = counts_.find(source);
   const size_t count = counted == counts_.end() ? 0 : counted->second;
@@ -276,22 +314,11 @@ std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
     return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
                         max_connection_count_);
   }
-  const size_t kept_for_unix = max_connection_count_ / kUnixPart;
-  if (!absl::StartsWith(source, "unix:") && all >= max_connection_count_ - kept_for_unix) {
-    return absl::StrCat("the last ", kept_for_unix, " of ", max_connection_count_,
-                        " places are for the Unix socket");
-  }
   const size_t kept = max_connection_count_ / kKeptPart;
   if (all < max_connection_count_ - kept || count < kFewConnections) return "";
   return absl::StrCat("it has ", count, " already, and the last ", kept, " of ",
                       max_connection_count_, " places are for clients with fewer than ",
                       kFewConnections);
-}
-
-void ConnectionGate::Tell(const std::string& source, const std::string& reason) {
-  WarnOnce(source,
-           absl::StrCat("closed a new connection from ", source, ": ", reason,
-                        "; for 30 s further ones that reach a limit are closed without a line"));
 }
 
 void ConnectionGate::WarnOnce(const std::string& subject, const std::string& line) {
@@ -303,72 +330,58 @@ void ConnectionGate::WarnOnce(const std::string& subject, const std::string& lin
 
 bool ConnectionGate::IsOpen(const std::string& peer) const {
   const MutexLock lock(&mutex_);
-  const auto found = connections_.find(peer);
-  return found != connections_.end() && found->second.is_open();
+  return connections_.contains(peer);
 }
 
-bool ConnectionGate::Refuse(const std::string& peer) {
+std::string ConnectionGate::WhyRefused(const std::string& peer) const {
   const MutexLock lock(&mutex_);
-  if (!EndLocked(peer)) return false;
-  RefuseSourceLocked(peer);
-  return true;
+  const auto found = connections_.find(peer);
+  return found == connections_.end() ? "" : found->second.refusal;
 }
 
 bool ConnectionGate::End(const std::string& peer) {
   const MutexLock lock(&mutex_);
-  return EndLocked(peer);
-}
-
-bool ConnectionGate::EndLocked(const std::string& peer) {
   const auto found = connections_.find(peer);
-  if (found == connections_.end() || found->second.refused || !found->second.is_open()) {
-    return false;
-  }
-  found->second.refused = true;
-  // gRPC, which owns the descriptor, then sees the end of the connection and closes the descriptor.
+  if (found == connections_.end() || std::exchange(found->second.ending, true)) return false;
+  // gRPC then sees the end of the connection, and closes its own descriptor.
   shutdown(found->second.descriptor, SHUT_RDWR);
   DiscardReceived(found->second.descriptor);
   return true;
 }
 
-bool ConnectionGate::RefuseSource(const std::string& peer) {
+bool ConnectionGate::Refuse(const std::string& source) {
   const MutexLock lock(&mutex_);
-  return RefuseSourceLocked(peer);
-}
-
-bool ConnectionGate::RefuseSourceLocked(const std::string& peer) {
   const auto now = Now();
   std::erase_if(refused_, [now](const auto& each) { return each.second <= now; });
-  return refused_.insert_or_assign(source_of_(peer), now + RefusalTimeOf(peer)).second;
+  return refused_.emplace(source, now + RefusalTimeOf(source)).second;
 }
 
 std::optional<TcpBytes> ConnectionGate::CountBytes(const std::string& peer) const {
   const MutexLock lock(&mutex_);
   const auto found = connections_.find(peer);
-  if (found == connections_.end() || !found->second.is_open()) return std::nullopt;
+  if (found == connections_.end() || found->second.ending) return std::nullopt;
   return CountTcpBytes(found->second.descriptor);
 }
 
-std::chrono::seconds ConnectionGate::RefusalTimeOf(const std::string& peer) const {
-  return source_of_(peer) == kLoopback ? kLoopbackRefusal : kRefusal;
+std::chrono::seconds ConnectionGate::RefusalTimeOf(const std::string& source) {
+  return source == kLoopback ? kLoopbackRefusal : kRefusal;
 }
 
 size_t ConnectionGate::open_count() const {
   const MutexLock lock(&mutex_);
-  return static_cast<size_t>(
-      std::ranges::count_if(connections_, [](const auto& each) { return each.second.is_open(); }));
+  return connections_.size() - refused_count_;
 }
 
 size_t RaiseConnectionLimit() {
+  constexpr size_t kMost = kDescriptorsOfConnection * kMaxConnectionCount + kOwnDescriptorCount;
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
-  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, kMaxConnectionCount + kOwnDescriptorCount);
-  rlimit now{};
-  getrlimit(RLIMIT_NOFILE, &now);
-  if (now.rlim_cur < limit.rlim_cur && setrlimit(RLIMIT_NOFILE, &limit) == 0) now = limit;
-  const size_t count = now.rlim_cur;
-  if (count < 2 * kOwnDescriptorCount) return count / 2;
-  return std::min(kMaxConnectionCount, count - kOwnDescriptorCount);
+  rlimit raised = limit;
+  raised.rlim_cur = std::min<rlim_t>(limit.rlim_max, kMost);
+  if (limit.rlim_cur < raised.rlim_cur && setrlimit(RLIMIT_NOFILE, &raised) == 0) limit = raised;
+  const size_t count = std::min<size_t>(limit.rlim_cur, kMost);
+  const size_t own = std::min(kOwnDescriptorCount, count / 2);
+  return (count - own) / kDescriptorsOfConnection;
 }
 
 }  // namespace carillon

@@ -111,6 +111,14 @@ absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
   if (!absl::ConsumePrefix(&path, "unix:")) return ParseTcp(text);
   absl::ConsumePrefix(&path, "//");
   if (path.empty() || path.size() >= sizeof(sockaddr_un::sun_path)) return InvalidAddress(text);
+  // A client of gRPC reads the path as that of a URI, or as a list of paths.
+  const size_t unreachable = path.find_first_of(",%?#");
+  if (unreachable != absl::string_view::npos) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+                   absl::StrCat("no client could reach \"", text, "\", because its path has \"",
+                                path.substr(unreachable, 1),
+                                "\"; choose a path without the characters , % ? and #"));
+  }
   ListenAddress address;
   address.socket_path = std::string(path);
   return address;

@@ -46,22 +46,6 @@ class Reflected {
     return Ask(request);
   }
 
-  /// Asks for a symbol until the call has ended, and reads no answer meanwhile.
-  void AskUnread(const std::string& name) {
-    reflection::ServerReflectionRequest request;
-    request.set_file_containing_symbol(name);
-    while (stream_->Write(request)) {
-    }
-  }
-
-  /// Returns the status with which the daemon ends the call by itself.
-  grpc::Status Wait() {
-    reflection::ServerReflectionResponse response;
-    while (stream_->Read(&response)) {
-    }
-    return stream_->Finish();
-  }
-
   grpc::Status End() {
     stream_->WritesDone();
     return stream_->Finish();
@@ -105,40 +89,6 @@ TEST_F(ReflectionTest, HasTheFileOfEveryServiceThatItLists) {
     EXPECT_TRUE(reflected.AskForSymbol(service.name()).has_file_descriptor_response())
         << service.name();
   }
-}
-
-TEST_F(ReflectionTest, EndsACallThatAsksWithoutEnd) {
-  Reflected reflected(channel());
-  reflection::ServerReflectionRequest request;
-  request.set_list_services("");
-  reflection::ServerReflectionResponse response;
-  int count = 0;
-  while (reflected.TryAsk(request, response)) ++count;
-  EXPECT_EQ(count, 1000);
-  ExpectRefused(reflected.End(), grpc::StatusCode::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
-}
-
-/// A daemon that does not wait long for its clients.
-class IdleReflectionTest : public ServedDaemon {
- protected:
-  IdleReflectionTest() : ServedDaemon({.rendering_idle_s = 1}) {}
-};
-
-TEST_F(IdleReflectionTest, EndsACallThatAsksNothing) {
-  Reflected silent(channel());
-  Reflected asks(channel());
-  asks.AskForSymbol("carillon.v1.Impulse");
-  EXPECT_EQ(silent.Wait().error_code(), grpc::CANCELLED);
-  EXPECT_EQ(asks.Wait().error_code(), grpc::CANCELLED);
-  Reflected later(channel());
-  later.AskForSymbol("carillon.v1.Impulse");
-  EXPECT_TRUE(later.End().ok());
-}
-
-TEST_F(IdleReflectionTest, EndsACallThatReadsNoAnswer) {
-  Reflected unread(channel());
-  unread.AskUnread("carillon.v1.SceneService");
-  EXPECT_EQ(unread.Wait().error_code(), grpc::CANCELLED);
 }
 
 TEST_F(ReflectionTest, SendsEachFileWithAllThatItImports) {
@@ -185,15 +135,6 @@ TEST_F(ReflectionTest, SaysWhatIsNotThere) {
   EXPECT_EQ(reflected.Ask(request).all_extension_numbers_response().base_type_name(),
             "carillon.v1.Impulse");
   EXPECT_EQ(reflected.Ask({}).error_response().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-}
-
-TEST_F(ReflectionTest, RefusesALargeRequest) {
-  Reflected reflected(channel());
-  reflection::ServerReflectionRequest request;
-  request.set_file_containing_symbol(std::string(8192, 'x'));
-  reflection::ServerReflectionResponse response;
-  EXPECT_FALSE(reflected.TryAsk(request, response));
-  ExpectRefused(reflected.End(), grpc::StatusCode::INVALID_ARGUMENT, "REQUEST_MALFORMED");
 }
 
 }  // namespace

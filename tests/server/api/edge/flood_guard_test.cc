@@ -13,33 +13,14 @@ namespace carillon {
 namespace {
 
 using testing::HasSubstr;
-using testing::IsEmpty;
 
-TEST(FindFloodTest, LetsAConnectionHaveItsCallsAndSomeThatFail) {
-  const ConnectionCalls before{.begun_count = 1000, .answered_count = 900, .failed_count = 10};
-  EXPECT_THAT(
-      FindFlood(before, {.begun_count = 1256, .answered_count = 990, .failed_count = 10}, 0.1),
-      IsEmpty());
-  EXPECT_THAT(
-      FindFlood(before, {.begun_count = 3000, .answered_count = 2010, .failed_count = 990}, 0.1),
-      IsEmpty());
-}
-
-TEST(FindFloodTest, FindsCallsThatNeverEndAndCallsThatFailWithoutEnd) {
-  EXPECT_THAT(FindFlood({}, {.begun_count = 600}, 0.1), HasSubstr("600 open calls"));
-  EXPECT_THAT(FindFlood({}, {.begun_count = 1100, .failed_count = 1100}, 0.4),
-              HasSubstr("cancelled 1100 calls"));
-}
-
-TEST(FindFloodTest, ToleratesCallsThatEndWhileTheyAreCounted) {
+TEST(ConnectionCalls, CallsThatEndWhileTheyAreCountedAreNotOpen) {
   EXPECT_EQ((ConnectionCalls{.begun_count = 7, .answered_count = 8}.open_count()), 0U);
 }
 
-TEST(MostIdleBytesTest, GrowsWithOpenCallsWithWhatWasReceivedAndWithTime) {
-  EXPECT_EQ(MostIdleBytes(0, 0, 0), kMostIdleBytes);
-  EXPECT_EQ(MostIdleBytes(2, 0, 0), kMostIdleBytes + (4U << 20U));
-  EXPECT_EQ(MostIdleBytes(512, 0, 0), kMostIdleBytes + (96U << 20U));
-  EXPECT_EQ(MostIdleBytes(0, 6400, 10), kMostIdleBytes + 100 + 10'240);
+TEST(AllowedBytes, GrowWithWhatWasReceivedAndWithTime) {
+  EXPECT_EQ(AllowedBytes(0, 0), 0U);
+  EXPECT_EQ(AllowedBytes(6400, 10), 100 + 10'240U);
 }
 
 using ConnectionCallsTest = ServedDaemon;

@@ -43,6 +43,14 @@ TEST(ListenAddress, OneAddressMayBeWrittenInMoreThanOneWay) {
   EXPECT_FALSE(same("unix:/a/s", "localhost:1"));
 }
 
+TEST(ListenAddress, RefusesAPathThatNoClientCouldReach) {
+  for (const char* path : {"/tmp/a,b", "/tmp/a%20b", "/tmp/a?b", "/tmp/a#b"}) {
+    EXPECT_THAT(ParseListenAddress(std::string("unix:") + path).status().ToString(),
+                testing::AllOf(testing::HasSubstr("INVALID_ADDRESS: "), testing::HasSubstr(path)));
+  }
+  EXPECT_TRUE(ParseListenAddress("unix:/tmp/a b@c:d").ok());
+}
+
 TEST(ListenAddress, RefusesWhatIsNone) {
   for (const std::string& text :
        {std::string(), std::string("unix:"), std::string("localhost"), std::string(":80"),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/grpc_servers.h"
+#include "server/api/edge/grpc_servers.h"
 
+#include <grpcpp/ext/health_check_service_server_builder_option.h>
 #include <grpcpp/health_check_service_interface.h>
 
 #include <array>
@@ -9,14 +10,15 @@
 
 #include "absl/strings/match.h"
 #include "server/api/edge/client_limits.h"
-#include "server/api/edge/flood_guard.h"
-#include "server/api/services/reflection_service.h"
 
 namespace carillon {
 namespace {
 
 using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
 
+/// Greatest number of open calls on one connection. gRPC makes further calls wait in the client,
+/// but only after the client has confirmed this limit.
+constexpr int kMaxCallsOfConnection = 256;
 /// Time within which a new connection must send its HTTP/2 settings and, with TLS, complete its
 /// handshake.
 constexpr int kHandshakeLimit_ms = 5'000;
@@ -24,6 +26,8 @@ constexpr int kHandshakeLimit_ms = 5'000;
 /// within kKeepaliveAnswer_ms.
 constexpr int kKeepalive_ms = 30'000;
 constexpr int kKeepaliveAnswer_ms = 10'000;
+/// Time for which a connection without a place stays open for its calls, and again for their end.
+constexpr int kRefusal_ms = 1'000;
 /// With 0, any number of pings is answered. With a limit, gRPC 1.51 closes the connection only
 /// after all its data is sent, and keeps 1 kB for each ping that comes meanwhile.
 constexpr int kNoPingStrikes = 0;
@@ -35,10 +39,9 @@ constexpr int kIdentityOnly = 1 << GRPC_COMPRESS_NONE;
 /// seconds.
 constexpr int kReadBytes = 16 << 10;
 
-constexpr char kHealthService[] = "grpc.health.v1.Health";
-
-constexpr size_t kCount = 1 + GrpcServers::kTcpCount;
+constexpr size_t kCount = 2 + GrpcServers::kTcpCount;
 constexpr size_t kUnixServer = 0;
+constexpr size_t kRefusingServer = kCount - 1;
 
 /// Returns which server a process or address uses.
 size_t ServerOf(const std::string& source) {
@@ -56,6 +59,12 @@ class GrpcTaker final : public ConnectionTaker {
     Acceptor::NewConnectionParameters parameters;
     parameters.fd = connection;
     acceptors_[ServerOf(source)]->HandleNewConnection(&parameters);
+  }
+
+  void Refuse(int connection) override {
+    Acceptor::NewConnectionParameters parameters;
+    parameters.fd = connection;
+    acceptors_[kRefusingServer]->HandleNewConnection(&parameters);
   }
 
  private:
@@ -81,14 +90,17 @@ void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
 
 }  // namespace
 
-GrpcServers::GrpcServers(IdleCalls& idle_calls, const Clock& clock)
-    : idle_calls_(idle_calls), clock_(clock) {
+GrpcServers::GrpcServers() {
   // Builders that are made later add health to their servers.
   grpc::EnableDefaultHealthCheckService(true);
   for (size_t i = 0; i < kCount; ++i) {
     builders_.push_back(std::make_unique<grpc::ServerBuilder>());
     LimitClients(i == kUnixServer ? kUnixMemoryBytes : kTcpMemoryBytes, *builders_.back());
   }
+  grpc::ServerBuilder& refusing = *builders_[kRefusingServer];
+  refusing.SetOption(std::make_unique<grpc::HealthCheckServiceServerBuilderOption>(nullptr));
+  refusing.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, kRefusal_ms);
+  refusing.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, kRefusal_ms);
 }
 
 GrpcServers::~GrpcServers() {
@@ -107,13 +119,14 @@ std::unique_ptr<ConnectionTaker> GrpcServers::AddTaker(
   return std::make_unique<GrpcTaker>(std::move(acceptors));
 }
 
-bool GrpcServers::Start(absl::Span<const ServedService> services) {
-  std::vector<std::string> names = {kHealthService};
-  for (const ServedService& served : services) names.emplace_back(served.name);
-  reflection_ = MakeReflectionServices(std::move(names), idle_calls_, clock_);
+bool GrpcServers::Start(absl::Span<grpc::Service* const> services,
+                        grpc::CallbackGenericService& refusing) {
   for (const auto& builder : builders_) {
-    for (const ServedService& served : services) builder->RegisterService(&served.service);
-    for (const auto& service : reflection_) builder->RegisterService(service.get());
+    if (builder == builders_[kRefusingServer]) {
+      builder->RegisterCallbackGenericService(&refusing);
+    } else {
+      for (grpc::Service* service : services) builder->RegisterService(service);
+    }
     std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
     if (!server) return false;
     servers_.push_back(std::move(server));
@@ -122,8 +135,8 @@ bool GrpcServers::Start(absl::Span<const ServedService> services) {
 }
 
 void GrpcServers::SetHealth(const std::string& service, bool serves) {
-  for (const auto& server : servers_) {
-    server->GetHealthCheckService()->SetServingStatus(service, serves);
+  for (size_t i = 0; i < kRefusingServer; ++i) {
+    servers_[i]->GetHealthCheckService()->SetServingStatus(service, serves);
   }
 }
 

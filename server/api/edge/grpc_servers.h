@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <grpcpp/generic/async_generic_service.h>
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
@@ -11,19 +12,12 @@
 
 #include "absl/types/span.h"
 #include "server/api/edge/connection_gate.h"
-#include "server/api/edge/idle_calls.h"
-#include "server/base/clock.h"
 
 namespace carillon {
 
-/// A service and its full name.
-struct ServedService {
-  grpc::Service& service;
-  const char* name;
-};
-
 /// Several gRPC servers with the same services: one for Unix sockets, and one for each group of
-/// addresses over TCP.
+/// addresses over TCP. One more tells the clients of other connections why there is no place for
+/// them.
 ///
 /// gRPC bounds the memory of a server. Beyond the bound it ends calls of any connection of this
 /// server, also of connections that take little memory. One client with unfinished messages would
@@ -36,8 +30,7 @@ class GrpcServers {
   /// Memory that gRPC may take for the connections over Unix sockets.
   static constexpr size_t kUnixMemoryBytes = size_t{256} << 20U;
 
-  /// Open calls of reflection are added to `idle_calls`, which must outlive this as `clock` must.
-  GrpcServers(IdleCalls& idle_calls, const Clock& clock);
+  GrpcServers();
 
   /// Cancels the calls that have not ended kGracePeriod later, and waits until all have ended.
   ~GrpcServers();
@@ -49,9 +42,10 @@ class GrpcServers {
   std::unique_ptr<ConnectionTaker> AddTaker(
       const std::shared_ptr<grpc::ServerCredentials>& credentials);
 
-  /// Starts all servers with these services, health and reflection. Returns false if gRPC does not
-  /// take the credentials. The services must outlive the servers.
-  bool Start(absl::Span<const ServedService> services);
+  /// Starts all servers with these services and health. `refusing` answers the calls of connections
+  /// without a place. Returns false if gRPC does not take the credentials. The services must
+  /// outlive the servers.
+  bool Start(absl::Span<grpc::Service* const> services, grpc::CallbackGenericService& refusing);
 
   /// Sets the health of a service. Any thread may call it after Start.
   void SetHealth(const std::string& service, bool serves);
@@ -59,9 +53,6 @@ class GrpcServers {
  private:
   static constexpr std::chrono::milliseconds kGracePeriod{500};
 
-  IdleCalls& idle_calls_;
-  const Clock& clock_;
-  std::vector<std::unique_ptr<grpc::Service>> reflection_;
   std::vector<std::unique_ptr<grpc::ServerBuilder>> builders_;
   std::vector<std::unique_ptr<grpc::Server>> servers_;
 };
