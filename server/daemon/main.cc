@@ -45,6 +45,7 @@
 #include "server/live_output/live_output.h"
 #include "server/metrics/metrics_server.h"
 #include "server/mode_database/database.h"
+#include "server/mode_database/database_files.h"
 #include "server/mode_database/maintenance/database_admin.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
@@ -80,18 +81,23 @@ void CollectUnusedMeshes(ModeDatabase& database) {
   spdlog::info("{} meshes that no model or job refers to were deleted", collected->mesh_count);
 }
 
-void LogMissingChanges(const Database& database) {
-  if (const std::string missing = database.MissingChanges(); !missing.empty()) {
-    spdlog::error("{}", missing);
-  }
+/// SQLite maps the index of its log into memory, which all users of a database must share.
+void WarnOfNetwork(const Database& database) {
+  const std::string network = NetworkFileSystemOf(database.file());
+  if (network.empty()) return;
+  spdlog::warn(
+      "{} is on {}: while that cannot be reached, the daemon waits or is killed (SIGBUS), and a "
+      "program on another computer that opens the database damages it; choose a folder on a disk "
+      "of this computer with --data-dir",
+      database.file().string(), network);
 }
 
-/// Sets the budget of models, logs the stored changes that are missing, and removes unused meshes.
+/// Sets the budget of models, warns of a database on a network, and removes unused meshes.
 void Tidy(ModeDatabase& database, const Options& options) {
   database.models().KeepWithin({.bytes = static_cast<uint64_t>(options.model_budget_mib) << 20U,
                                 .log = LogWarning,
                                 .log_event = LogEvent});
-  LogMissingChanges(database.database());
+  WarnOfNetwork(database.database());
   CollectUnusedMeshes(database);
 }
 
@@ -259,27 +265,25 @@ absl::Status PrintContents(const std::filesystem::path& file) {
   return absl::OkStatus();
 }
 
-/// Says how many faults a check or a repair has found.
-absl::Status Conclude(int finding_count, absl::string_view outcome) {
-  std::cout << finding_count << (finding_count == 1 ? " fault" : " faults") << std::endl;
-  if (finding_count == 0) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT", outcome);
+/// Checks a database, and prints its faults and what it has.
+absl::Status Check(const std::filesystem::path& file) {
+  int fault_count = 0;
+  RETURN_IF_ERROR(CheckDatabase(file, [&fault_count](const std::string& line) {
+    ++fault_count;
+    std::cout << line << std::endl;
+  }));
+  RETURN_IF_ERROR(PrintContents(file));
+  std::cout << fault_count << (fault_count == 1 ? " fault" : " faults") << std::endl;
+  if (fault_count == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
+                 "the faults above were found: restore a backup with `carillond db restore`, or "
+                 "import or compute the damaged models again");
 }
 
-absl::Status Check(const std::filesystem::path& file, const OnFinding& on_finding) {
-  RETURN_IF_ERROR(CheckDatabase(file, on_finding));
-  return PrintContents(file);
-}
-
-/// Prints what the database has now, and where the old one is.
-absl::Status Report(const std::filesystem::path& file, const std::filesystem::path& kept) {
-  std::error_code ignored;
-  if (std::filesystem::exists(kept, ignored)) {
-    std::cout << "the old database is kept as " << kept.string() << std::endl;
-  } else if (!kept.empty()) {
-    std::cout << "what was left of the old database is kept as " << kept.string()
-              << "-wal or -count" << std::endl;
-  }
+/// Restores a database, and prints what it has now and where the old one is.
+absl::Status Restore(const std::filesystem::path& file, const std::filesystem::path& copy) {
+  ASSIGN_OR_RETURN(const std::filesystem::path kept, RestoreDatabase(file, copy));
+  if (!kept.empty()) std::cout << "the old database is kept as " << kept.string() << std::endl;
   return PrintContents(file);
 }
 
@@ -306,7 +310,7 @@ int CheckOnly(const CommandLine& command) {
   return EXIT_SUCCESS;
 }
 
-/// Runs `carillond db check|repair|restore`.
+/// Runs `carillond db check|restore`.
 absl::Status RunDatabaseCommand(const CommandLine& command) {
   signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
   const std::filesystem::path folder = command.options.data_directory;
@@ -320,23 +324,8 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
                                 folder.string(), ": name its folder with --data-dir"));
   }
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(folder));
-  int finding_count = 0;
-  const auto on_finding = [&](const std::string& line) {
-    ++finding_count;
-    std::cout << line << std::endl;
-  };
   const std::filesystem::path file = directory.database_file();
-  if (command.database_command == "check") {
-    RETURN_IF_ERROR(Check(file, on_finding));
-    return Conclude(finding_count,
-                    "the faults above were found: `carillond db repair` keeps all undamaged rows");
-  }
-  ASSIGN_OR_RETURN(
-      const std::filesystem::path kept,
-      restores ? RestoreDatabase(file, command.backup_file) : RepairDatabase(file, on_finding));
-  RETURN_IF_ERROR(Report(file, kept));
-  if (restores) return absl::OkStatus();
-  return Conclude(finding_count, "what the lines above name is lost; all else was kept");
+  return restores ? Restore(file, command.backup_file) : Check(file);
 }
 
 int Main(int argc, char* const* argv) {

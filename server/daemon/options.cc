@@ -268,9 +268,9 @@ void AddFlags(CLI::App& app, Options& options) {
                  "file that says who may do what over TCP, by tokens and clients' certificates");
 }
 
-/// "db check|repair|restore FILE".
+/// "db check|restore FILE".
 void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
-  CLI::App& db = *app.add_subcommand("db", "check or repair the database while no daemon runs");
+  CLI::App& db = *app.add_subcommand("db", "check or restore the database while no daemon runs");
   db.require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
     CLI::App* const sub = db.add_subcommand(name, description);
@@ -278,7 +278,6 @@ void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
     return sub;
   };
   add("check", "check the structure and every hash; exit status 1 if anything is damaged");
-  add("repair", "copy all undamaged rows into a new file and keep the old one beside it");
   add("restore", "replace the database by a backup")
       ->add_option("FILE", command.backup_file, "made by `carillon db backup`")
       ->required();

@@ -12,7 +12,6 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/mode_database/maintenance/database_replacement.h"
 #include "server/mode_database/schema.h"
 
 namespace carillon {
@@ -35,9 +34,8 @@ constexpr char kWriter[] =
     "PRAGMA journal_size_limit = 16777216; PRAGMA secure_delete = FAST;";
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem::path& file,
-                                                          const char* first = kReader,
-                                                          const std::string& vfs = "") {
-  ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file, vfs));
+                                                          const char* first = kReader) {
+  ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
   RETURN_IF_ERROR(connection->RunScript(first));
   RETURN_IF_ERROR(connection->RunScript(
       "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;"));
@@ -66,6 +64,13 @@ absl::StatusOr<bool> ShouldShrink(SqliteConnection& writer) {
 bool EmptyLog(SqliteConnection& writer) {
   const absl::StatusOr<int64_t> busy = Figure(writer, "PRAGMA wal_checkpoint(TRUNCATE)");
   return busy.ok() && *busy == 0;
+}
+
+/// Returns a file's size, or zero if there is no such file.
+uintmax_t SizeOf(const std::filesystem::path& file) {
+  std::error_code error;
+  const uintmax_t byte_count = std::filesystem::file_size(file, error);
+  return error ? 0 : byte_count;
 }
 
 /// SQLite holds locks of its own for moments.
@@ -119,19 +124,17 @@ absl::StatusOr<std::unique_ptr<Database>> Database::Open(const std::filesystem::
   std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), error);
   if (error) return Unusable(file, error.message());
   ASSIGN_OR_RETURN(const std::filesystem::path real, FollowLinks(file));
-  RETURN_IF_ERROR(CompleteReplacement(real));
   std::unique_ptr<Database> database(new Database(real));
   RETURN_IF_ERROR(database->ConnectWriter());
-  RETURN_IF_ERROR(database->ReadChangeCount());
   return database;
 }
 
 absl::Status Database::ConnectWriter() {
   const MutexLock lock(&writer_mutex_);
-  auto connection = Connect(file_, kWriter, files_.vfs_name());
+  auto connection = Connect(file_, kWriter);
   if (ToErrorInfo(connection.status()).reason() == "DATABASE_FULL") {
     reserve_.Release();
-    connection = Connect(file_, kWriter, files_.vfs_name());
+    connection = Connect(file_, kWriter);
   }
   const absl::Status status = connection.status();
   if (absl::IsInternal(status) || absl::IsFailedPrecondition(status)) {
@@ -139,23 +142,30 @@ absl::Status Database::ConnectWriter() {
   }
   RETURN_IF_ERROR(status);
   writer_ = *std::move(connection);
-  return InTransaction(*writer_, "BEGIN IMMEDIATE", [](SqliteConnection& c) { return Migrate(c); });
+  return Change([&writer = *writer_] {
+    return InTransaction(writer, "BEGIN IMMEDIATE", [](SqliteConnection& c) { return Migrate(c); });
+  });
 }
 
-absl::Status Database::ReadChangeCount() {
-  const MutexLock lock(&writer_mutex_);
-  ASSIGN_OR_RETURN(change_count_,
-                   Figure(*writer_, "SELECT value FROM facts WHERE name = 'change_count'"));
-  missing_change_count_ = std::max<int64_t>(0, change_count_file_.Read() - change_count_);
-  return files_.Check();
+// Another program that uses SQLite may make the file smaller, for example by VACUUM. The file then
+// still has the pages that SQLite counts.
+absl::Status Database::CheckSize() {
+  const uintmax_t byte_count = SizeOf(file_);
+  if (byte_count >= byte_count_) return absl::OkStatus();
+  const absl::StatusOr<int64_t> page_count = Figure(*writer_, "PRAGMA page_count");
+  const absl::StatusOr<int64_t> page_bytes = Figure(*writer_, "PRAGMA page_size");
+  const bool has_all = page_count.ok() && page_bytes.ok() &&
+                       byte_count >= static_cast<uintmax_t>(*page_count * *page_bytes);
+  return has_all ? absl::OkStatus() : watch_.Lose();
 }
 
-std::string Database::MissingChanges() const {
-  if (missing_change_count_ == 0) return "";
-  return absl::StrCat(
-      missing_change_count_, " changes that were acknowledged are missing in ", file_.string(),
-      ": somebody removed its -wal file, or put an older file in its place; put the "
-      "right files back, or restore a backup");
+absl::Status Database::Change(absl::FunctionRef<absl::Status()> work) {
+  RETURN_IF_ERROR(watch_.Check());
+  RETURN_IF_ERROR(CheckSize());
+  absl::Status worked = work();
+  byte_count_ = SizeOf(file_);
+  RETURN_IF_ERROR(watch_.Check());
+  return worked;
 }
 
 absl::Status Database::Write(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
@@ -178,7 +188,7 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
   absl::Status status = WriteLocked(body);
   if (!has_no_room(status)) return status;
   // After a checkpoint the log is written from its beginning again.
-  RETURN_IF_ERROR(files_.Change([&writer = *writer_] {
+  RETURN_IF_ERROR(Change([&writer = *writer_] {
     Figure(writer, "PRAGMA wal_checkpoint(RESTART)").status().IgnoreError();
     return absl::OkStatus();
   }));
@@ -194,22 +204,9 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
 }
 
 absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  SqliteConnection& writer = *writer_;
-  const int64_t row_count = writer.total_changed_row_count();
-  int64_t change_count = change_count_;
-  const auto change = [&](SqliteConnection& connection) {
-    RETURN_IF_ERROR(body(connection));
-    if (connection.total_changed_row_count() == row_count) return absl::OkStatus();
-    return connection.Run("INSERT OR REPLACE INTO facts (name, value) VALUES ('change_count', ?)",
-                          {std::to_string(++change_count)});
-  };
-  absl::Status status =
-      files_.Change([&] { return InTransaction(writer, "BEGIN IMMEDIATE", change); });
+  absl::Status status = Change([&] { return InTransaction(*writer_, "BEGIN IMMEDIATE", body); });
   RememberFailure(status);
-  if (!status.ok()) return status;
-  if (change_count != change_count_) change_count_file_.Write(change_count);
-  change_count_ = change_count;
-  return absl::OkStatus();
+  return status;
 }
 
 void Database::RememberFailure(const absl::Status& status) {
@@ -221,7 +218,7 @@ void Database::RememberFailure(const absl::Status& status) {
 }
 
 absl::Status Database::CheckState() {
-  RETURN_IF_ERROR(files_.Check());
+  RETURN_IF_ERROR(watch_.Check());
   const MutexLock lock(&failure_mutex_);
   return failure_;
 }
@@ -244,16 +241,16 @@ void Database::CopyLog() {
   const auto copy = [&writer = *writer_] {
     return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
   };
-  files_.Change(copy).IgnoreError();
+  Change(copy).IgnoreError();
 }
 
 absl::Status Database::Tidy() {
   MutexLock lock(&writer_mutex_);
-  RETURN_IF_ERROR(files_.Check());
+  RETURN_IF_ERROR(watch_.Check());
   reserve_.Take();
   ASSIGN_OR_RETURN(const bool should_shrink, ShouldShrink(*writer_));
   if (!should_shrink) return absl::OkStatus();
-  return files_.Change([&writer = *writer_] {
+  return Change([&writer = *writer_] {
     RETURN_IF_ERROR(writer.RunScript("PRAGMA incremental_vacuum(256)"));
     return Figure(writer, "PRAGMA wal_checkpoint(PASSIVE)").status();
   });
@@ -268,7 +265,7 @@ bool Database::MakeSpaceLocked() {
   // The log has to hold the pages of a portion, for which a full disk may have little room.
   constexpr int kMostPortions = 16;
   SqliteConnection& writer = *writer_;
-  const int64_t before = files_.byte_count();
+  const uintmax_t before = SizeOf(file_) + SizeOf(LogOf(file_));
   for (int portion = 0; portion < kMostPortions; ++portion) {
     const absl::StatusOr<bool> should_shrink = ShouldShrink(writer);
     if (!should_shrink.ok() || !*should_shrink) break;
@@ -282,13 +279,13 @@ bool Database::MakeSpaceLocked() {
       EmptyLog(writer);
       return absl::OkStatus();
     };
-    if (!files_.Change(shrink).ok()) break;
+    if (!Change(shrink).ok()) break;
   }
-  return files_.byte_count() < before;
+  return SizeOf(file_) + SizeOf(LogOf(file_)) < before;
 }
 
 absl::StatusOr<SpoolFile> Database::MakeSpool() {
-  RETURN_IF_ERROR(files_.Check());
+  RETURN_IF_ERROR(watch_.Check());
   return SpoolFile::Make(folder(), [this] {
     const bool made = MakeSpace();
     if (!made) RememberFailure(DiskFull(file_));
@@ -313,7 +310,7 @@ absl::StatusOr<std::unique_ptr<SqliteConnection>> Database::TakeReader() {
       return reader;
     }
   }
-  RETURN_IF_ERROR(files_.Check());
+  RETURN_IF_ERROR(watch_.Check());
   return Connect(file_);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -35,9 +36,9 @@ class Database {
   absl::Status WriteToFree(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
   /// Returns OK if the database can be changed, as far as is known without a change. Errors:
-  /// FailedPrecondition (DATABASE_LOST: a file is not in place; after this error every Write fails
-  /// with DATABASE_LOST), and the error of the last change if other changes would probably meet it
-  /// too: DATABASE_FULL, DATABASE_BUSY, DATABASE_IO_ERROR or DATABASE_CORRUPT.
+  /// FailedPrecondition (DATABASE_LOST: the file is not in place; after this error every Write
+  /// fails with DATABASE_LOST), and the error of the last change if other changes would probably
+  /// meet it too: DATABASE_FULL, DATABASE_BUSY, DATABASE_IO_ERROR or DATABASE_CORRUPT.
   absl::Status CheckState();
 
   /// Returns what CheckState returns. If the last change failed, first makes a small change to see
@@ -48,7 +49,7 @@ class Database {
   void CopyLog();
 
   /// Gives some free pages back to the disk if at least a quarter of the file is free, and renews
-  /// the reserve for a full disk. A file that an older program made shrinks only after `db repair`.
+  /// the reserve for a full disk. A file that an older program made does not shrink.
   absl::Status Tidy();
 
   /// Gives free pages, at most 64 MiB, and the space of the log back to the disk at once if at
@@ -61,11 +62,6 @@ class Database {
   /// is full. Errors: DATABASE_LOST, and those of SpoolFile::Make.
   absl::StatusOr<SpoolFile> MakeSpool();
 
-  /// Returns a text with the number of changes that were acknowledged once but are missing from the
-  /// opened file, because its write-ahead log was removed or the file is an older copy. Returns an
-  /// empty text if no change is missing.
-  std::string MissingChanges() const;
-
   /// Runs `body` on one snapshot of the database.
   absl::Status Read(absl::FunctionRef<absl::Status(SqliteConnection&)> body);
 
@@ -75,11 +71,15 @@ class Database {
 
  private:
   explicit Database(std::filesystem::path file)
-      : file_(std::move(file)), files_(file_), change_count_file_(file_), reserve_(file_) {}
+      : file_(std::move(file)), watch_(file_), reserve_(file_) {}
 
   absl::Status ConnectWriter();
 
-  absl::Status ReadChangeCount();
+  /// Looks at the file, runs `work`, which may change it, and looks at it again. Each change must
+  /// be made here. Errors: DATABASE_LOST, or the work's error.
+  absl::Status Change(absl::FunctionRef<absl::Status()> work)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
+  absl::Status CheckSize() ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
   absl::Status WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_mutex_);
   void RememberFailure(const absl::Status& status);
@@ -87,12 +87,11 @@ class Database {
   absl::StatusOr<std::unique_ptr<SqliteConnection>> TakeReader();
 
   const std::filesystem::path file_;
-  DatabaseFiles files_;
-  const ChangeCount change_count_file_;
+  FileWatch watch_;
   const DiskReserve reserve_;
-  int64_t missing_change_count_ = 0;
   Mutex writer_mutex_;
-  int64_t change_count_ ABSL_GUARDED_BY(writer_mutex_) = 0;
+  /// Size of the file after the last change. A smaller file was truncated.
+  uintmax_t byte_count_ ABSL_GUARDED_BY(writer_mutex_) = 0;
   std::unique_ptr<SqliteConnection> writer_ ABSL_PT_GUARDED_BY(writer_mutex_);
   Mutex failure_mutex_;
   absl::Status failure_ ABSL_GUARDED_BY(failure_mutex_);

@@ -2,25 +2,22 @@
 #include "server/mode_database/database_files.h"
 
 #include <fcntl.h>
+#include <linux/magic.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
-#include <fstream>
-#include <limits>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/status_macros.h"
 
 namespace carillon {
 namespace {
@@ -32,21 +29,15 @@ constexpr uintmax_t kLeastReserveBytes = 1 << 20;
 constexpr uintmax_t kReservePart = 4;
 constexpr char kUnfinishedSuffix[] = "-unfinished-";
 
-std::filesystem::path LogOf(const std::filesystem::path& file) { return file.string() + "-wal"; }
-
-std::filesystem::path CountOf(const std::filesystem::path& file) {
-  return file.string() + "-count";
-}
-
 /// Whether `name` is that of an unfinished copy of the database `file`, or of a file that SQLite or
 /// the daemon keeps beside such a copy. An operator may give other names.
 bool IsUnfinishedCopy(absl::string_view name, const std::string& file) {
-  constexpr std::array<absl::string_view, 7> kSuffixes = {"",       "-wal",     "-shm", "-journal",
-                                                          "-count", "-reserve", "-lost"};
+  constexpr std::array<absl::string_view, 5> kSuffixes = {"", "-wal", "-shm", "-journal",
+                                                          "-reserve"};
   if (!absl::ConsumePrefix(&name, file + kUnfinishedSuffix)) return false;
   if (absl::ConsumePrefix(&name, "backup-")) {
     name.remove_prefix(std::min(name.find_first_not_of("0123456789"), name.size()));
-  } else if (!absl::ConsumePrefix(&name, "restore") && !absl::ConsumePrefix(&name, "repair")) {
+  } else if (!absl::ConsumePrefix(&name, "restore")) {
     return false;
   }
   return absl::c_linear_search(kSuffixes, name);
@@ -59,76 +50,47 @@ absl::Status IsNoFile(const std::filesystem::path& file, absl::string_view why) 
 
 }  // namespace
 
-bool DatabaseFiles::IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                            WrittenFile& written) {
-  bool is_same = false;
-  const bool has_all = written.IsWhole([&]() -> int64_t {
-    struct stat status {};
-    const bool exists = stat(file.c_str(), &status) == 0;
-    if (exists && !seen) seen = Seen{.device = status.st_dev, .inode = status.st_ino};
-    is_same = exists ? seen->device == status.st_dev && seen->inode == status.st_ino : !seen;
-    return exists ? status.st_size : std::numeric_limits<int64_t>::max();
-  });
-  return is_same && has_all;
-}
+std::filesystem::path LogOf(const std::filesystem::path& file) { return file.string() + "-wal"; }
 
-absl::Status DatabaseFiles::Check() {
+absl::Status FileWatch::Check() {
   const MutexLock lock(&mutex_);
-  const bool has_database = IsWhole(file_, database_, writes_.database());
-  const bool has_log = IsWhole(LogOf(file_), log_, writes_.log());
-  const bool was_lost = std::exchange(lost_, lost_ || !has_database || !has_log);
-  if (!lost_) return absl::OkStatus();
-  if (!was_lost) LossMark(file_).Set();
-  // The stop would copy a damaged log into the file.
-  writes_.database().Close();
-  writes_.log().Close();
+  struct stat now {};
+  const bool exists = stat(file_.c_str(), &now) == 0;
+  if (exists && !seen_) seen_ = {now.st_dev, now.st_ino};
+  lost_ = lost_ || !exists || seen_ != std::pair(now.st_dev, now.st_ino);
+  return lost_ ? Lost() : absl::OkStatus();
+}
+
+absl::Status FileWatch::Lose() {
+  const MutexLock lock(&mutex_);
+  lost_ = true;
+  return Lost();
+}
+
+absl::Status FileWatch::Lost() const {
   return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_LOST",
-                 absl::StrCat("somebody removed, replaced, truncated or overwrote ", file_.string(),
-                              " or its -wal file while the daemon ran, so that nothing can be "
-                              "stored any more: stop the daemon, put the files back or run "
-                              "carillond db restore, and start it again"));
+                 absl::StrCat("somebody removed, replaced or truncated ", file_.string(),
+                              " while the daemon ran, so that nothing can be stored any more: stop "
+                              "the daemon, put the file back or run carillond db restore, and "
+                              "start it again"));
 }
 
-absl::Status DatabaseFiles::Change(absl::FunctionRef<absl::Status()> work) {
-  RETURN_IF_ERROR(Check());
-  absl::Status worked = work();
-  RETURN_IF_ERROR(Check());
-  return worked;
+std::string NetworkFileSystem(int64_t magic) {
+  switch (magic) {
+    case NFS_SUPER_MAGIC:
+      return "NFS";
+    case SMB_SUPER_MAGIC:
+    case CIFS_SUPER_MAGIC:
+    case SMB2_SUPER_MAGIC:
+      return "SMB";
+    default:
+      return "";
+  }
 }
 
-LossMark::LossMark(const std::filesystem::path& file) : file_(file.string() + "-lost") {}
-
-void LossMark::Set() const { std::ofstream{file_}; }
-
-bool LossMark::IsSet() const {
-  std::error_code error;
-  return std::filesystem::exists(file_, error);
-}
-
-void LossMark::Remove() const {
-  std::error_code ignored;
-  std::filesystem::remove(file_, ignored);
-}
-
-ChangeCount::ChangeCount(const std::filesystem::path& file)
-    : descriptor_(open(CountOf(file).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {}
-
-ChangeCount::~ChangeCount() {
-  if (descriptor_ >= 0) close(descriptor_);
-}
-
-int64_t ChangeCount::Read() const {
-  std::array<char, 20> text{};
-  const ssize_t size = pread(descriptor_, text.data(), text.size(), 0);
-  int64_t count = 0;
-  if (size > 0) std::from_chars(text.data(), text.data() + size, count);
-  return count;
-}
-
-/// A count that cannot be written stays behind, which does no harm.
-void ChangeCount::Write(int64_t count) const {
-  const std::string text = absl::StrFormat("%-19d\n", count);
-  [[maybe_unused]] const ssize_t written = pwrite(descriptor_, text.data(), text.size(), 0);
+std::string NetworkFileSystemOf(const std::filesystem::path& file) {
+  struct statfs found {};
+  return statfs(file.c_str(), &found) == 0 ? NetworkFileSystem(found.f_type) : "";
 }
 
 DiskReserve::DiskReserve(const std::filesystem::path& file) : file_(file.string() + "-reserve") {}

@@ -7,94 +7,45 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "absl/base/thread_annotations.h"
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
-#include "server/mode_database/write_watch.h"
 
 namespace carillon {
 
-/// Watches a database file and its write-ahead log, because SQLite itself goes on writing to files
-/// that somebody has removed, replaced, truncated or overwritten. Safe from every thread.
-class DatabaseFiles {
+/// Returns the name of the write-ahead log of the database `file`, which has its newest changes.
+std::filesystem::path LogOf(const std::filesystem::path& file);
+
+/// Looks whether a database file is still the one that was opened, because SQLite itself goes on
+/// writing to a file that somebody has removed, replaced or truncated. Safe from every thread.
+class FileWatch {
  public:
-  explicit DatabaseFiles(const std::filesystem::path& file) : file_(file) {}
+  explicit FileWatch(const std::filesystem::path& file) : file_(file) {}
 
-  /// Name of the VFS through which the connection that writes must be opened, and which tells this
-  /// object what SQLite has written to the files. That connection must be closed first.
-  const std::string& vfs_name() const { return writes_.vfs_name(); }
-
-  /// Checks both files. Errors: FailedPrecondition (DATABASE_LOST: a file was removed or replaced,
-  /// or is smaller than SQLite has made it, or a write has found that its first bytes are not
-  /// those that SQLite wrote, or the -shm file was truncated). Once a function of
-  /// this object has returned DATABASE_LOST, all later calls return it. The first call remembers
-  /// which files they are, and must follow the first write.
+  /// Looks at the file once. Errors: FailedPrecondition (DATABASE_LOST: the file was removed or
+  /// replaced). Once a function of this object has returned DATABASE_LOST, all later calls return
+  /// it. The first call remembers which file it is.
   absl::Status Check();
 
-  /// Checks both files, runs `work`, which may change them, and checks them again. Each write of
-  /// the daemon must be made here. Errors: DATABASE_LOST, or the work's error.
-  absl::Status Change(absl::FunctionRef<absl::Status()> work);
-
-  /// Returns the size of both files.
-  int64_t byte_count() const {
-    return writes_.database().byte_count() + writes_.log().byte_count();
-  }
+  /// Notes that the file was truncated. Returns DATABASE_LOST.
+  absl::Status Lose();
 
  private:
-  struct Seen {
-    dev_t device = 0;
-    ino_t inode = 0;
-  };
-  static bool IsWhole(const std::filesystem::path& file, std::optional<Seen>& seen,
-                      WrittenFile& written);
+  absl::Status Lost() const;
 
   const std::filesystem::path file_;
-  WriteWatch writes_;
   Mutex mutex_;
-  std::optional<Seen> database_ ABSL_GUARDED_BY(mutex_);
-  std::optional<Seen> log_ ABSL_GUARDED_BY(mutex_);
+  std::optional<std::pair<dev_t, ino_t>> seen_ ABSL_GUARDED_BY(mutex_);
   bool lost_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
-/// An empty file beside a database that was lost while the daemon ran. The structure of such a
-/// database must be checked before it is used again.
-class LossMark {
- public:
-  /// `file` is the database file.
-  explicit LossMark(const std::filesystem::path& file);
-
-  /// A mark that cannot be set is not there at the next start.
-  void Set() const;
-  bool IsSet() const;
-  void Remove() const;
-
- private:
-  const std::filesystem::path file_;
-};
-
-/// The number of committed changes, in a file beside the database. A database with fewer changes
-/// has lost its write-ahead log or is an older copy. The daemon does not wait until the file is on
-/// the disk. After a loss of power the file may therefore count fewer changes than the database
-/// has, but never more.
-class ChangeCount {
- public:
-  /// `file` is the database file.
-  explicit ChangeCount(const std::filesystem::path& file);
-  ~ChangeCount();
-  ChangeCount(const ChangeCount&) = delete;
-  ChangeCount& operator=(const ChangeCount&) = delete;
-
-  /// Returns the count in the file, or zero if the file has no count.
-  int64_t Read() const;
-
-  void Write(int64_t count) const;
-
- private:
-  int descriptor_;
-};
+/// Returns the kind of the network file system on which a file lies, such as "NFS", or an empty
+/// text if the file lies on a disk of this computer. `magic` is the f_type of statfs.
+std::string NetworkFileSystem(int64_t magic);
+std::string NetworkFileSystemOf(const std::filesystem::path& file);
 
 /// A file that reserves space on the disk. It is removed when the disk is full, so that models can
 /// still be deleted.

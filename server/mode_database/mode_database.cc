@@ -13,7 +13,6 @@ namespace carillon {
 absl::StatusOr<std::unique_ptr<ModeDatabase>> ModeDatabase::Open(const std::filesystem::path& file,
                                                                  const Clock& clock) {
   ASSIGN_OR_RETURN(std::unique_ptr<Database> database, Database::Open(file));
-  RETURN_IF_ERROR(CheckAfterLoss(*database));
   database->CopyLog();
   RemoveUnfinishedCopies(database->file());
   return std::unique_ptr<ModeDatabase>(new ModeDatabase(std::move(database), clock));

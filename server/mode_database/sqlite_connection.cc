@@ -21,9 +21,10 @@ constexpr int kBusyTimeoutMs = static_cast<int>(SqliteConnection::kLongestWait.c
 absl::Status Damaged(absl::string_view what) {
   return Refusal(
       absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-      absl::StrCat("the database file is damaged, or the disk under it fails (", what,
-                   "): see the system's log; then stop the daemon, and run carillond db repair or "
-                   "carillond db restore"));
+      absl::StrCat(
+          "the database file is damaged, or the disk under it fails (", what,
+          "): see the system's log; then stop the daemon, and run carillond db restore, or "
+          "recover the file with sqlite3 as docs/operations.md describes"));
 }
 
 absl::Status NobodyWaits() { return absl::CancelledError("nobody waits for the copy any more"); }
@@ -123,8 +124,8 @@ class Row final : public SqlRow {
 }  // namespace
 
 struct SqliteConnection::State {
-  State(const std::string& file, const std::string& vfs)
-      : database(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs, vfs) {}
+  explicit State(const std::string& file)
+      : database(file, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeoutMs) {}
   SQLite::Database database;
 };
 
@@ -132,10 +133,10 @@ SqliteConnection::SqliteConnection(std::unique_ptr<State> state) : state_(std::m
 SqliteConnection::~SqliteConnection() = default;
 
 absl::StatusOr<std::unique_ptr<SqliteConnection>> SqliteConnection::Open(
-    const std::filesystem::path& file, const std::string& vfs) {
+    const std::filesystem::path& file) {
   std::unique_ptr<State> state;
   RETURN_IF_ERROR(Guarded([&] {
-    state = std::make_unique<State>(file.string(), vfs);
+    state = std::make_unique<State>(file.string());
     return absl::OkStatus();
   }));
   return std::unique_ptr<SqliteConnection>(new SqliteConnection(std::move(state)));
@@ -213,10 +214,6 @@ void SqliteConnection::SetLongestWait(std::chrono::milliseconds wait) {
 }
 
 int64_t SqliteConnection::changed_row_count() const { return state_->database.getChanges(); }
-
-int64_t SqliteConnection::total_changed_row_count() const {
-  return state_->database.getTotalChanges();
-}
 
 int64_t SqliteConnection::last_row_id() const { return state_->database.getLastInsertRowid(); }
 

@@ -41,10 +41,8 @@ class SqliteConnection {
   /// How long a new connection waits for a lock that another process holds.
   static constexpr std::chrono::milliseconds kLongestWait{10'000};
 
-  /// Opens the file through the VFS with this name, or SQLite's own if it is empty, and creates the
-  /// file unless it exists.
-  static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file,
-                                                                const std::string& vfs = "");
+  /// Opens the file, and creates it unless it exists.
+  static absl::StatusOr<std::unique_ptr<SqliteConnection>> Open(const std::filesystem::path& file);
   ~SqliteConnection();
 
   /// Runs one statement that returns no rows.
@@ -72,9 +70,6 @@ class SqliteConnection {
 
   /// Number of rows that the last statement changed.
   int64_t changed_row_count() const;
-
-  /// Number of rows that all statements of this connection changed.
-  int64_t total_changed_row_count() const;
 
   /// Key of the row inserted last.
   int64_t last_row_id() const;

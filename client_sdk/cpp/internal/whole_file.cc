@@ -24,8 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Suffixes of the files that belong to a database and have its name.
-constexpr const char* kCompanions[] = {"-wal",  "-shm",         "-count",  "-reserve",
-                                       "-lost", "-replacement", "-journal"};
+constexpr const char* kCompanions[] = {"-wal", "-shm", "-reserve", "-journal"};
 
 /// Follows a database's name in the names of copies that are being made. The daemon removes them.
 constexpr char kUnfinished[] = "-unfinished-";

@@ -2,20 +2,16 @@
 #include "server/mode_database/maintenance/database_admin.h"
 
 #include <memory>
-#include <string_view>
 #include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
-#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/database_contents.h"
-#include "server/mode_database/database_files.h"
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/model_sql.h"
 #include "server/mode_database/sqlite_connection.h"
@@ -79,9 +75,23 @@ absl::Status CheckStructure(Database& database, const OnFinding& on_finding) {
   });
 }
 
+/// Returns the digests in `table` as far as they can be read. An error is a finding.
+std::vector<std::string> DigestsIn(Database& database, const std::string& table,
+                                   const OnFinding& on_finding) {
+  std::vector<std::string> digests;
+  const absl::Status status = database.Read([&](SqliteConnection& connection) {
+    return connection.Query(absl::StrCat("SELECT digest FROM ", table, " ORDER BY rowid").c_str(),
+                            {}, [&](const SqlRow& row) {
+                              digests.push_back(row.Text(0));
+                              return absl::OkStatus();
+                            });
+  });
+  if (!status.ok()) on_finding(absl::StrCat(table, ": ", status.message()));
+  return digests;
+}
+
 absl::Status CheckModels(Database& database, const OnFinding& on_finding) {
-  const auto digests = Names(database, "models", on_finding);
-  for (const std::string& digest : digests) {
+  for (const std::string& digest : DigestsIn(database, "models", on_finding)) {
     const absl::Status status = database.Read([&](SqliteConnection& connection) {
       const absl::StatusOr<ModelSummary> summary = SelectModel(connection, digest);
       return summary.ok() ? ReadModel(connection, *summary).status() : summary.status();
@@ -94,7 +104,7 @@ absl::Status CheckModels(Database& database, const OnFinding& on_finding) {
 absl::Status CheckTransfers(Database& database, const OnFinding& on_finding) {
   const SystemClock clock;
   TransferStore transfers(database, clock);
-  for (const std::string& digest : Names(database, "models", on_finding)) {
+  for (const std::string& digest : DigestsIn(database, "models", on_finding)) {
     uint64_t row_count = 0;
     const absl::Status counted = database.Read([&](SqliteConnection& connection) {
       return connection.Query(
@@ -114,11 +124,14 @@ absl::Status CheckTransfers(Database& database, const OnFinding& on_finding) {
 }
 
 absl::Status CheckMeshes(Database& database, const OnFinding& on_finding) {
-  for (const std::string& digest : Names(database, "meshes", on_finding)) {
+  for (const std::string& digest : DigestsIn(database, "meshes", on_finding)) {
     Sha256 sha;
-    const absl::Status status = ReadMesh(database, digest, [&](std::string_view bytes) {
-      sha.Update(bytes);
-      return absl::OkStatus();
+    const absl::Status status = database.Read([&](SqliteConnection& connection) {
+      return connection.Query("SELECT data FROM mesh_chunks WHERE digest = ? ORDER BY byte_offset",
+                              {digest}, [&](const SqlRow& row) {
+                                sha.Update(row.Blob(0));
+                                return absl::OkStatus();
+                              });
     });
     if (!status.ok() || sha.Finish() != digest) {
       on_finding(absl::StrCat("the mesh ", digest, " has changed on the disk"));
@@ -129,7 +142,7 @@ absl::Status CheckMeshes(Database& database, const OnFinding& on_finding) {
 
 absl::Status CheckJobs(Database& database, const OnFinding& on_finding) {
   JobStore jobs(database);
-  for (const std::string& digest : Names(database, "jobs", on_finding)) {
+  for (const std::string& digest : DigestsIn(database, "jobs", on_finding)) {
     const auto job = jobs.Find(digest);
     if (!job.ok()) {
       on_finding(std::string(job.status().message()));
@@ -158,29 +171,8 @@ absl::Status BackUp(Database& database, const std::filesystem::path& copy,
   return SqliteConnection::CheckStructure(copy, goes_on);
 }
 
-absl::Status CheckAfterLoss(Database& database) {
-  const LossMark mark(database.file());
-  if (!mark.IsSet()) return absl::OkStatus();
-  std::string fault;
-  RETURN_IF_ERROR(database.Read([&](SqliteConnection& connection) {
-    return connection.Query("PRAGMA quick_check(1)", {}, [&](const SqlRow& row) {
-      fault = row.Text(0);
-      return absl::OkStatus();
-    });
-  }));
-  if (fault == "ok") {
-    mark.Remove();
-    return absl::OkStatus();
-  }
-  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
-                 absl::StrCat("somebody changed the files of ", database.file().string(),
-                              " while the last daemon ran, and damaged the database (", fault,
-                              "): run carillond db repair or carillond db restore"));
-}
-
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding) {
   ASSIGN_OR_RETURN(const std::unique_ptr<Database> database, Database::Open(file));
-  if (const std::string missing = database->MissingChanges(); !missing.empty()) on_finding(missing);
   for (const auto check : {CheckStructure, CheckModels, CheckTransfers, CheckMeshes, CheckJobs}) {
     RETURN_IF_ERROR(check(*database, on_finding));
   }

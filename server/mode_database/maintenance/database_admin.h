@@ -36,10 +36,6 @@ absl::StatusOr<DatabaseStats> ReadStats(Database& database);
 absl::Status BackUp(Database& database, const std::filesystem::path& copy,
                     absl::FunctionRef<bool()> goes_on);
 
-/// Checks the structure of a database that was lost when it was open last (LossMark). Errors:
-/// DataLoss (DATABASE_CORRUPT).
-absl::Status CheckAfterLoss(Database& database);
-
 /// Takes the faults that a check finds, one line for each.
 using OnFinding = std::function<void(const std::string& line)>;
 
@@ -50,19 +46,11 @@ using OnFinding = std::function<void(const std::string& line)>;
 /// (DATABASE_CORRUPT) if the structure cannot be read.
 absl::Status CheckDatabase(const std::filesystem::path& file, const OnFinding& on_finding);
 
-/// Copies every undamaged model, mesh and job into a new database, which replaces the old one.
-/// `on_finding` gets each row that is left out. Returns the name under which the old database is
-/// kept: `file`.damaged, or `file`.damaged-2 and so on if that exists. A failed repair leaves the
-/// database as it was. Errors: FailedPrecondition (DATABASE_UNUSABLE), ResourceExhausted
-/// (DATABASE_FULL).
-absl::StatusOr<std::filesystem::path> RepairDatabase(const std::filesystem::path& file,
-                                                     const OnFinding& on_finding);
-
 /// Replaces the database by a copy, after a check of the copy: a file that BackUp made, or a
-/// database that no program has open, with the log and the count beside it. Returns the name under
-/// which the old database is kept, `file`.replaced or `file`.replaced-2 and so on, or an empty path
-/// if there was none. A failed restore leaves the database as it was. Errors: NotFound
-/// (FILE_NOT_FOUND), DataLoss (DATABASE_CORRUPT: damaged, or not a database of Carillon),
+/// database that no program has open, with the log beside it. Returns the name under which the old
+/// database is kept with its log, `file`.replaced or `file`.replaced-2 and so on, or an empty path
+/// if there was none. A failed or killed restore leaves the old database in place or kept. Errors:
+/// NotFound (FILE_NOT_FOUND), DataLoss (DATABASE_CORRUPT: damaged, or not a database of Carillon),
 /// FailedPrecondition (SCHEMA_TOO_NEW; DATABASE_UNUSABLE: `copy` is the database itself),
 /// ResourceExhausted (DATABASE_FULL).
 absl::StatusOr<std::filesystem::path> RestoreDatabase(const std::filesystem::path& file,

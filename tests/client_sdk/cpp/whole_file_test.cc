@@ -79,8 +79,7 @@ TEST_F(WholeFileTest, FollowsLinksToAFileThatMayBeMissing) {
 }
 
 TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
-  for (const char* companion :
-       {"-wal", "-shm", "-count", "-reserve", "-lost", "-replacement", "-journal"}) {
+  for (const char* companion : {"-wal", "-shm", "-reserve", "-journal"}) {
     const std::string beside = file_.string() + companion;
     Put(file_, "live");
     Put(beside, "live");

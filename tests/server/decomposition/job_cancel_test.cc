@@ -3,7 +3,6 @@
 // Who ends a job that several clients have asked for.
 #include "absl/strings/str_cat.h"
 #include "server/decomposition/wanted_job.h"
-#include "server/mode_database/maintenance/database_admin.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
@@ -113,18 +112,6 @@ TEST_F(JobCancelTest, AJobOfAnEarlierDaemonIsCancelledByThoseThatWantedItThere) 
   SubmitFor("mallory", 2);
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
   EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "alice").status()));
-}
-
-TEST_F(JobCancelTest, ARepairedDatabaseKnowsWhoWantsItsJobs) {
-  MakeBusyQueue();
-  const v1::Job job = SubmitFor("alice", 2);
-  queue_.reset();
-  database_.reset();
-  ASSERT_TRUE(RepairDatabase(folder_ / "carillon.db", [](const std::string&) {}).ok());
-  Open("carillon.db");
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "bob").status()));
-  CancelToTheEnd("alice", job);
 }
 
 TEST_F(JobCancelTest, AJobThatAClientHasCancelledCountsForAnother) {

@@ -124,15 +124,6 @@ TEST_F(TransferStoreTest, ATransferThatChangedOnTheDiskIsLeftOutAndReported) {
   EXPECT_EQ(Found(10), 2);
 }
 
-TEST_F(TransferStoreTest, ARepairKeepsTransfers) {
-  PutModel(model_);
-  ASSERT_TRUE(Put(model_, 10).ok());
-  database_.reset();
-  ASSERT_TRUE(RepairDatabase(file_, [](const std::string&) {}).ok());
-  Reopen();
-  EXPECT_EQ(Found(10), 2);
-}
-
 TEST_F(TransferStoreTest, CollectionCountsTransfersWithTheirModel) {
   PutModel(model_);
   const uint64_t model_bytes = database_->models().Summary(digest_)->stored_bytes;

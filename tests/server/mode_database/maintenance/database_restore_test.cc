@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A database takes the place of another, by a repair or a restore that may be killed.
-
-#include "server/mode_database/maintenance/database_replacement.h"
+// A copy takes the place of a database.
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -13,7 +11,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,14 +31,11 @@ using std::filesystem::path;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
 
-class DatabaseReplacementTest : public ::testing::Test {
+class DatabaseRestoreTest : public ::testing::Test {
  protected:
-  DatabaseReplacementTest() {
-    WriteRecords(folder_ / "model", SampleRecords(SampleModel(20, 100)));
-  }
+  DatabaseRestoreTest() { WriteRecords(folder_ / "model", SampleRecords(SampleModel(20, 100))); }
 
   /// Stores a model of this name in a database.
   void Put(const path& file, const std::string& name) {
@@ -66,7 +60,7 @@ class DatabaseReplacementTest : public ::testing::Test {
                     .PutFile(Sha256Hex("in the log"), "in the log", folder_ / "model")
                     .status()
                     .ok());
-    for (const char* suffix : {"", "-wal", "-count"}) {
+    for (const char* suffix : {"", "-wal"}) {
       std::filesystem::copy_file(live / (std::string("db") + suffix), folder_ / (name + suffix),
                                  std::filesystem::copy_options::overwrite_existing);
     }
@@ -87,7 +81,7 @@ class DatabaseReplacementTest : public ::testing::Test {
   SystemClock clock_;
 };
 
-TEST_F(DatabaseReplacementTest, EveryDatabaseThatWasReplacedIsKept) {
+TEST_F(DatabaseRestoreTest, EveryDatabaseThatWasReplacedIsKept) {
   Put(file_, "first");
   for (const char* name : {"second", "third"}) {
     const path copy = folder_ / name;
@@ -98,27 +92,28 @@ TEST_F(DatabaseReplacementTest, EveryDatabaseThatWasReplacedIsKept) {
   EXPECT_THAT(Labels(file_), ElementsAre("third"));
   EXPECT_THAT(Labels(folder_ / "carillon.db.replaced"), ElementsAre("first"));
   EXPECT_THAT(Labels(folder_ / "carillon.db.replaced-2"), ElementsAre("second"));
-  const auto damaged = RepairDatabase(file_, [](const std::string&) {});
-  EXPECT_EQ(damaged->filename(), "carillon.db.damaged");
-  EXPECT_EQ(RepairDatabase(file_, [](const std::string&) {})->filename(), "carillon.db.damaged-2");
-  EXPECT_THAT(Labels(file_), ElementsAre("third"));
 }
 
-TEST_F(DatabaseReplacementTest, ADatabaseIsRestoredWithItsLog) {
+TEST_F(DatabaseRestoreTest, ADatabaseIsRestoredWithItsLog) {
   Put(file_, "old");
   CopyWithLog("copy");
   const auto kept = RestoreDatabase(file_, folder_ / "copy");
   ASSERT_TRUE(kept.ok()) << kept.status();
   EXPECT_THAT(Labels(file_), ElementsAre("in the log"));
-  // The count says that the log is missing.
-  CopyWithLog("copy");
-  std::filesystem::remove(folder_ / "copy-wal");
-  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
-              HasSubstr("DATABASE_CORRUPT: "));
-  EXPECT_THAT(Labels(file_), ElementsAre("in the log"));
 }
 
-TEST_F(DatabaseReplacementTest, AKeptDatabaseNeverGetsTheLogOfAnother) {
+TEST_F(DatabaseRestoreTest, TheNewDatabaseDoesNotGetTheLogOfTheOld) {
+  CopyWithLog("carillon.db");
+  std::ofstream(folder_ / "carillon.db-shm") << "an index";
+  Put(folder_ / "copy", "new");
+  const auto kept = RestoreDatabase(file_, folder_ / "copy");
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_THAT(Names(), Not(Contains(testing::AnyOf("carillon.db-wal", "carillon.db-shm"))));
+  EXPECT_THAT(Labels(file_), ElementsAre("new"));
+  EXPECT_THAT(Labels(*kept), ElementsAre("in the log"));
+}
+
+TEST_F(DatabaseRestoreTest, AKeptDatabaseNeverGetsTheLogOfAnother) {
   Put(file_, "old");
   Put(folder_ / "copy", "new");
   std::ofstream(folder_ / "carillon.db.replaced-wal") << "of another";
@@ -128,7 +123,7 @@ TEST_F(DatabaseReplacementTest, AKeptDatabaseNeverGetsTheLogOfAnother) {
   EXPECT_THAT(Labels(*kept), ElementsAre("old"));
 }
 
-TEST_F(DatabaseReplacementTest, ALogThatIsLeftAloneIsKeptUnderAPrintedName) {
+TEST_F(DatabaseRestoreTest, ALogThatIsLeftAloneIsKeptUnderAPrintedName) {
   Put(folder_ / "copy", "new");
   std::ofstream(folder_ / "carillon.db-wal") << "a log";
   const auto kept = RestoreDatabase(file_, folder_ / "copy");
@@ -138,27 +133,7 @@ TEST_F(DatabaseReplacementTest, ALogThatIsLeftAloneIsKeptUnderAPrintedName) {
   EXPECT_THAT(Labels(file_), ElementsAre("new"));
 }
 
-TEST_F(DatabaseReplacementTest, ADatabaseWhoseLogCouldNotBeEmptiedReplacesNothing) {
-  Put(file_, "old");
-  CopyWithLog("fresh");
-  EXPECT_THAT(ReplaceDatabase(file_, folder_ / "fresh", "replaced").status().ToString(),
-              HasSubstr("DATABASE_FULL: "));
-  EXPECT_THAT(Labels(file_), ElementsAre("old"));
-  EXPECT_THAT(Names(), Not(Contains(HasSubstr("fresh"))));
-  EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace"))));
-}
-
-TEST_F(DatabaseReplacementTest, AReplacementThatCannotBeNotedDoesNotBegin) {
-  Put(file_, "old");
-  Put(folder_ / "copy", "new");
-  std::filesystem::create_symlink("/dev/full", folder_ / "carillon.db-replacement.part");
-  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
-              HasSubstr("DATABASE_FULL: "));
-  EXPECT_THAT(Labels(file_), ElementsAre("old"));
-  EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace"))));
-}
-
-TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) {
+TEST_F(DatabaseRestoreTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) {
   Put(file_, "old");
   const std::vector<std::string> before = Names();
   const path foreign = folder_ / "foreign";
@@ -178,7 +153,7 @@ TEST_F(DatabaseReplacementTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) 
   EXPECT_EQ(Names(), before);
 }
 
-TEST_F(DatabaseReplacementTest, ADatabaseIsNotRestoredFromItself) {
+TEST_F(DatabaseRestoreTest, ADatabaseIsNotRestoredFromItself) {
   Put(file_, "old");
   std::filesystem::create_symlink(file_, folder_ / "link");
   const path unfinished = UnfinishedCopy(file_, "restore");
@@ -191,7 +166,7 @@ TEST_F(DatabaseReplacementTest, ADatabaseIsNotRestoredFromItself) {
   EXPECT_THAT(Labels(file_), ElementsAre("old"));
 }
 
-TEST_F(DatabaseReplacementTest, ARestoreFollowsLinksToItsFiles) {
+TEST_F(DatabaseRestoreTest, ARestoreFollowsLinksToItsFiles) {
   const path disk = folder_ / "disk";
   std::filesystem::create_directory(disk);
   Put(disk / "real.db", "old");
@@ -209,20 +184,6 @@ TEST_F(DatabaseReplacementTest, ARestoreFollowsLinksToItsFiles) {
   EXPECT_TRUE(std::filesystem::is_symlink(file_));
 }
 
-TEST_F(DatabaseReplacementTest, AReplacementThatFailsIsUndoneAndDoesNotFollowLater) {
-  Put(file_, "old");
-  Put(folder_ / "copy", "new");
-  // A folder can be neither linked nor copied as a file is.
-  std::filesystem::remove(folder_ / "carillon.db-count");
-  std::filesystem::create_directory(folder_ / "carillon.db-count");
-  std::ofstream(folder_ / "carillon.db-wal") << "";
-  const std::vector<std::string> before = Names();
-  EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
-              HasSubstr("carillon.db-count cannot be copied or replaced"));
-  EXPECT_EQ(Names(), before);
-  EXPECT_THAT(Labels(file_), ElementsAre("old"));
-}
-
 /// Makes a file immutable, or takes that back. Returns whether this user and the file system can.
 bool SetImmutable(const path& file, bool immutable) {
   const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
@@ -234,10 +195,9 @@ bool SetImmutable(const path& file, bool immutable) {
   return can;
 }
 
-TEST_F(DatabaseReplacementTest, AnImmutableFileOfTheOldDatabaseKeepsItInPlace) {
+TEST_F(DatabaseRestoreTest, AnImmutableFileOfTheOldDatabaseKeepsItInPlace) {
   Put(folder_ / "copy", "new");
-  for (const char* name :
-       {"carillon.db", "carillon.db-wal", "carillon.db-count", "carillon.db-shm"}) {
+  for (const char* name : {"carillon.db", "carillon.db-wal", "carillon.db-shm"}) {
     Put(file_, "old");
     { const std::ofstream empty(folder_ / name, std::ios::app); }
     if (!SetImmutable(folder_ / name, true)) GTEST_SKIP() << "no file can be made immutable here";
@@ -247,14 +207,13 @@ TEST_F(DatabaseReplacementTest, AnImmutableFileOfTheOldDatabaseKeepsItInPlace) {
     EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace")))) << name;
     EXPECT_THAT(Names(), Not(Contains(HasSubstr("unfinished")))) << name;
     EXPECT_THAT(Labels(file_), ElementsAre("old")) << name;
-    EXPECT_THAT((*Database::Open(file_))->MissingChanges(), IsEmpty()) << name;
   }
 }
 
-TEST_F(DatabaseReplacementTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
+TEST_F(DatabaseRestoreTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
   Put(file_, "old");
   Put(folder_ / "copy", "new");
-  for (const char* name : {"restore", "restore-wal", "repair", "repair-count"}) {
+  for (const char* name : {"restore", "restore-wal"}) {
     std::ofstream(UnfinishedCopy(file_, name)) << "a part";
   }
   std::ofstream(folder_ / "carillon.db.incoming") << "an operator's file";
@@ -264,43 +223,7 @@ TEST_F(DatabaseReplacementTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
   EXPECT_THAT(Labels(file_), ElementsAre("new"));
 }
 
-TEST_F(DatabaseReplacementTest, WhatAKilledProgramHasBegunIsCompletedAtTheNextStart) {
-  // What the program had done when it was killed, after the marker had been written.
-  const std::vector<std::function<void()>> steps = {
-      [] {}, [this] { std::filesystem::create_hard_link(file_, folder_ / "carillon.db.replaced"); },
-      [this] { std::filesystem::remove(folder_ / "carillon.db-wal"); },
-      [this] { std::filesystem::rename(folder_ / "fresh", file_); },
-      [this] { std::filesystem::rename(folder_ / "fresh-count", folder_ / "carillon.db-count"); }};
-  for (size_t count = 1; count <= steps.size(); ++count) {
-    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
-      if (entry.path().filename() != "model") std::filesystem::remove(entry.path());
-    }
-    Put(file_, "old");
-    Put(folder_ / "fresh", "new");
-    std::ofstream(folder_ / "carillon.db-replacement") << "fresh\ncarillon.db.replaced\n";
-    for (size_t i = 0; i < count; ++i) steps[i]();
-    EXPECT_THAT(Labels(file_), ElementsAre("new")) << count;
-    EXPECT_THAT(Labels(folder_ / "carillon.db.replaced"), ElementsAre("old")) << count;
-    EXPECT_FALSE(std::filesystem::exists(folder_ / "carillon.db-replacement")) << count;
-    EXPECT_THAT((*Database::Open(file_))->MissingChanges(), IsEmpty()) << count;
-  }
-}
-
-TEST_F(DatabaseReplacementTest, ARepairKeepsWhatPrecedesTheCutOfAFile) {
-  for (int i = 0; i < 40; ++i) Put(file_, std::to_string(i));
-  const auto size = std::filesystem::file_size(file_);
-  std::filesystem::resize_file(file_, size - size / 4);
-  std::vector<std::string> findings;
-  const auto kept =
-      RepairDatabase(file_, [&](const std::string& line) { findings.push_back(line); });
-  ASSERT_TRUE(kept.ok()) << kept.status();
-  const size_t left = Labels(file_).size();
-  EXPECT_GT(left, 10U);
-  EXPECT_LT(left, 40U);
-  EXPECT_THAT(findings, Contains(HasSubstr("left out of models: ")));
-}
-
-TEST_F(DatabaseReplacementTest, ABackupOfATruncatedDatabaseIsRefused) {
+TEST_F(DatabaseRestoreTest, ABackupOfATruncatedDatabaseIsRefused) {
   Put(file_, "model");
   const auto database = *ModeDatabase::Open(file_, clock_);
   const auto back_up = [&] {
