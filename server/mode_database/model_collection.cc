@@ -17,16 +17,29 @@
 
 namespace carillon {
 
-bool ModelStore::InMemory(const std::string& digest) const {
-  const auto cached = cache_.find(digest);
-  return cached != cache_.end() && !cached->second.model.expired();
-}
+namespace {
 
-absl::Status ModelStore::WriteSounded(SqliteConnection& connection) {
-  for (const auto& [digest, unix_ms] : sounded_) {
+absl::Status WriteSounded(SqliteConnection& connection,
+                          const std::map<std::string, int64_t>& sounded) {
+  for (const auto& [digest, unix_ms] : sounded) {
     RETURN_IF_ERROR(StoreSounded(connection, digest, unix_ms));
   }
   return absl::OkStatus();
+}
+
+}  // namespace
+
+bool ModelStore::InMemory(const std::string& digest) {
+  const MutexLock lock(&cache_mutex_);
+  const auto cached = cache_.find(digest);
+  const auto latch = latches_.find(digest);
+  return (cached != cache_.end() && !cached->second.expired()) ||
+         (latch != latches_.end() && !latch->second.expired());
+}
+
+std::map<std::string, int64_t> ModelStore::Sounded() {
+  const MutexLock lock(&cache_mutex_);
+  return sounded_;
 }
 
 void ModelStore::CollectBeyondBudget(const std::string& newest) {
@@ -66,13 +79,10 @@ absl::StatusOr<Collected> ModelStore::CollectSome(uint64_t budget_bytes,
   std::vector<ModelSize> deleted;
   std::map<std::string, int64_t> stored;
   const auto collect = [&](SqliteConnection& connection) {
-    // Nobody who loads a model waits meanwhile for the disk or for another process, because the
-    // transaction has begun.
-    const MutexLock lock(&cache_mutex_);
     collected = {};
     deleted.clear();
-    stored = sounded_;
-    RETURN_IF_ERROR(WriteSounded(connection));
+    stored = Sounded();
+    RETURN_IF_ERROR(WriteSounded(connection, stored));
     std::vector<ModelSize> oldest_first;
     uint64_t total_bytes = 0;
     RETURN_IF_ERROR(SelectSizes(connection, [&](const ModelSize& model) {

@@ -10,8 +10,10 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/base/sha256.h"
 #include "server/base/usable_memory.h"
 #include "server/base/xxh3.h"
+#include "server/mode_database/model_checker.h"
 #include "server/mode_database/model_sql.h"
 
 namespace carillon {
@@ -89,7 +91,17 @@ absl::Status ModelExists(const ModelSummary& stored, Replacing replacing) {
 
 }  // namespace
 
-ModelImport::ModelImport(std::unique_ptr<State> state) : state_(std::move(state)) {}
+struct ModelImport::State {
+  SpoolFile file;
+  ModelSummary named;
+  Store store;
+  bool kept = false;
+  ModelChecker checker{};
+  Sha256 sha{};
+};
+
+ModelImport::ModelImport(SpoolFile file, ModelSummary named, Store store)
+    : state_(std::make_unique<State>(State{std::move(file), std::move(named), std::move(store)})) {}
 ModelImport::ModelImport(ModelImport&&) noexcept = default;
 ModelImport& ModelImport::operator=(ModelImport&&) noexcept = default;
 ModelImport::~ModelImport() = default;
@@ -108,12 +120,12 @@ absl::Status ModelImport::Append(const v1::ModalModelRecord& record) {
 
 absl::StatusOr<ModelSummary> ModelImport::Finish() {
   RETURN_IF_ERROR(state_->checker.Finish());
-  if (state_->summary.digest.empty()) state_->summary.digest = state_->sha.Finish();
+  if (state_->named.digest.empty()) state_->named.digest = state_->sha.Finish();
   const auto open = [&file = state_->file]() -> absl::StatusOr<ModelFileReader> {
     RETURN_IF_ERROR(file.Rewind());
     return ModelFileReader(file.descriptor());
   };
-  return state_->store.Store(open, state_->summary, state_->replacing, &state_->kept);
+  return state_->store(open, state_->named, state_->kept);
 }
 
 bool ModelImport::kept() const { return state_->kept; }

@@ -2,9 +2,11 @@
 #include "server/mode_database/model_sql.h"
 
 #include <bit>
+#include <cstring>
 #include <limits>
 #include <utility>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -221,6 +223,36 @@ absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSu
   absl::StatusOr<ModalModel> model = decoder.Finish(summary.digest);
   if (!model.ok()) return ModelCorrupt(summary.digest, model.status().message());
   return model;
+}
+
+absl::StatusOr<std::vector<double>> ReadEigenvalues(SqliteConnection& connection,
+                                                    const ModelSummary& summary) {
+  const auto& arrays = summary.header.arrays();
+  const auto wanted = static_cast<uint32_t>(
+      absl::c_find_if(arrays, [](const auto& array) { return array.name() == "eigenvalues"; }) -
+      arrays.begin());
+  std::string bytes;
+  bool is_past = false;
+  absl::Status bad;
+  const auto take = [&](const ChunkView& chunk) -> absl::Status {
+    is_past = chunk.array > wanted;
+    if (is_past) return absl::CancelledError("the arrays that follow are not read");
+    if (chunk.array < wanted) return absl::OkStatus();
+    if (Xxh3(chunk.data) != chunk.xxh3) bad = ModelCorrupt(summary.digest, "a hash is wrong");
+    bytes += chunk.data;
+    return bad;
+  };
+  const absl::Status status =
+      SelectChunks(connection, summary.revision, 0, std::numeric_limits<int64_t>::max(), take);
+  RETURN_IF_ERROR(bad);
+  if (absl::IsDataLoss(status)) return ModelCorrupt(summary.digest, status.message());
+  if (!is_past) RETURN_IF_ERROR(status);
+  std::vector<double> eigenvalues(summary.header.mode_count());
+  if (bytes.size() != eigenvalues.size() * sizeof(double)) {
+    return ModelCorrupt(summary.digest, "eigenvalues are missing");
+  }
+  std::memcpy(eigenvalues.data(), bytes.data(), bytes.size());
+  return eigenvalues;
 }
 
 absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -12,7 +13,7 @@
 #include "carillon/v1/modal_model.pb.h"
 #include "server/mode_database/modal_model.h"
 #include "server/mode_database/model_codec.h"
-#include "server/mode_database/model_store.h"
+#include "server/mode_database/model_row.h"
 #include "server/mode_database/sqlite_connection.h"
 
 namespace carillon {
@@ -50,6 +51,10 @@ absl::Status SelectChunks(SqliteConnection& connection, int64_t revision, int64_
 /// Returns the whole model after checking every hash.
 absl::StatusOr<ModalModel> ReadModel(SqliteConnection& connection, const ModelSummary& summary);
 
+/// Returns the eigenvalues alone, after checking their hashes.
+absl::StatusOr<std::vector<double>> ReadEigenvalues(SqliteConnection& connection,
+                                                    const ModelSummary& summary);
+
 /// Reads and checks every record and inserts the model as a new revision, which keeps the label and
 /// the pin of the revision that it replaces. Fills in `summary`.
 absl::Status InsertModel(SqliteConnection& connection, ModelFileReader& records,
@@ -71,12 +76,6 @@ absl::Status StoreSounded(SqliteConnection& connection, const std::string& diges
 absl::StatusOr<bool> QuarantineModel(SqliteConnection& connection, const std::string& digest);
 
 absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, int64_t revision);
-
-struct ModelSize {
-  std::string digest{};
-  uint64_t bytes = 0;  ///< of the model's arrays and its transfers
-  bool pinned = false;
-};
 
 /// Calls `on_model` for all models. The models that sounded (or, if they never sounded, were
 /// stored) longest ago come first.

@@ -10,9 +10,9 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
-#include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/model_codec.h"
+#include "server/mode_database/model_export.h"
 #include "server/mode_database/model_import.h"
 #include "server/mode_database/model_sql.h"
 #include "server/mode_database/page_token.h"
@@ -51,41 +51,8 @@ ModelSummary Named(const std::string& digest, const std::string& label) {
 
 }  // namespace
 
-absl::StatusOr<std::optional<v1::ModalModelRecord>> ModelExport::Next() {
-  if (!header_sent_) {
-    header_sent_ = true;
-    v1::ModalModelRecord record;
-    *record.mutable_header() = summary_.header;
-    return record;
-  }
-  if (next_chunk_ == chunk_count_) return std::nullopt;
-  std::optional<v1::ModalModelRecord> record;
-  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
-    return SelectChunks(connection, summary_.revision, next_chunk_, 1, [&](const ChunkView& view) {
-      v1::ModalModelChunk& chunk = *record.emplace().mutable_chunk();
-      chunk.set_array(view.array);
-      chunk.set_offset(view.offset);
-      chunk.set_xxh3(view.xxh3);
-      chunk.set_data(view.data.data(), view.data.size());
-      return absl::OkStatus();
-    });
-  }));
-  if (!record.has_value()) {
-    return Refusal(absl::StatusCode::kAborted, "MODAL_MODEL_REPLACED",
-                   "the model was replaced or deleted while it was read: export it again");
-  }
-  if (Xxh3(record->chunk().data()) != record->chunk().xxh3()) {
-    return store_->Quarantine(
-        summary_.digest, ModelCorrupt(summary_.digest, absl::StrCat("the hash of chunk ",
-                                                                    next_chunk_, " is wrong")));
-  }
-  ++next_chunk_;
-  return record;
-}
-
 void ModelStore::ListenToQuarantine(OnQuarantine on_quarantine) {
-  MutexLock lock(&listener_mutex_);
-  on_quarantine_ = std::move(on_quarantine);
+  on_quarantine_.Replace(std::move(on_quarantine));
 }
 
 // Returns `why`, or the error that kept the model out of quarantine.
@@ -95,8 +62,7 @@ absl::Status ModelStore::Quarantine(const std::string& digest, const absl::Statu
     ASSIGN_OR_RETURN(news, QuarantineModel(connection, digest));
     return absl::OkStatus();
   }));
-  MutexLock lock(&listener_mutex_);
-  if (news && on_quarantine_) on_quarantine_(digest, why);
+  if (news) on_quarantine_.Call(digest, why);
   return why;
 }
 
@@ -144,18 +110,18 @@ absl::StatusOr<ModelImport> ModelStore::Import(const std::string& digest, const 
                                                Replacing replacing) {
   if (const absl::Status status = CheckName(digest); !digest.empty() && !status.ok()) return status;
   ASSIGN_OR_RETURN(SpoolFile file, database_->MakeSpool());
-  return ModelImport(std::make_unique<ModelImport::State>(
-      ModelImport::State{*this, std::move(file), Named(digest, label), replacing}));
+  return ModelImport(std::move(file), Named(digest, label),
+                     [this, replacing](absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
+                                       const ModelSummary& named, bool& kept) {
+                       return Store(open, named, replacing, &kept);
+                     });
 }
 
 absl::StatusOr<ModelExport> ModelStore::Export(const std::string& digest) {
   ASSIGN_OR_RETURN(ModelSummary summary, Summary(digest));
-  ModelExport result(*database_, *this, std::move(summary));
-  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
-    ASSIGN_OR_RETURN(result.chunk_count_, CountChunks(connection, result.summary_.revision));
-    return absl::OkStatus();
-  }));
-  return result;
+  return ModelExport::Begin(
+      *database_, std::move(summary),
+      [this, digest](const absl::Status& why) { return Quarantine(digest, why); });
 }
 
 absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Find(const std::string& digest) {
@@ -172,23 +138,39 @@ absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::FindToSound(
   return model;
 }
 
-absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::string& digest) {
-  MutexLock lock(&cache_mutex_);
+std::shared_ptr<Mutex> ModelStore::LatchOf(const std::string& digest) {
+  const MutexLock lock(&cache_mutex_);
+  std::erase_if(latches_, [](const auto& entry) { return entry.second.expired(); });
+  std::weak_ptr<Mutex>& known = latches_[digest];
+  std::shared_ptr<Mutex> latch = known.lock();
+  if (latch == nullptr) known = latch = std::make_shared<Mutex>();
+  return latch;
+}
+
+std::shared_ptr<const ModalModel> ModelStore::Cached(const std::string& digest, int64_t revision) {
+  const MutexLock lock(&cache_mutex_);
+  const auto cached = cache_.find(digest);
   std::shared_ptr<const ModalModel> model;
-  const auto load = [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
+  if (cached != cache_.end()) model = cached->second.lock();
+  return model != nullptr && model->revision == revision ? model : nullptr;
+}
+
+absl::StatusOr<std::shared_ptr<const ModalModel>> ModelStore::Load(const std::string& digest) {
+  const std::shared_ptr<Mutex> latch = LatchOf(digest);
+  const MutexLock one_reader(latch.get());
+  std::shared_ptr<const ModalModel> model;
+  RETURN_IF_ERROR(database_->Read([&](SqliteConnection& connection) {
     ASSIGN_OR_RETURN(const ModelSummary row, SelectModel(connection, digest));
-    Cached& cached = cache_[digest];
-    model = cached.revision == row.revision ? cached.model.lock() : nullptr;
+    model = Cached(digest, row.revision);
     if (model != nullptr) return absl::OkStatus();
     ASSIGN_OR_RETURN(ModalModel read, ReadModel(connection, row));
     read.revision = row.revision;
     model = std::make_shared<const ModalModel>(std::move(read));
-    cached = {row.revision, model};
     return absl::OkStatus();
-  };
-  const absl::Status status = database_->Read(load);
-  std::erase_if(cache_, [](const auto& entry) { return entry.second.model.expired(); });
-  if (!status.ok()) return status;
+  }));
+  const MutexLock lock(&cache_mutex_);
+  std::erase_if(cache_, [](const auto& entry) { return entry.second.expired(); });
+  cache_[digest] = model;
   return model;
 }
 
@@ -209,8 +191,15 @@ void ModelStore::AddSounded(ModelSummary& summary) {
 }
 
 absl::StatusOr<std::vector<double>> ModelStore::Eigenvalues(const std::string& digest) {
-  ASSIGN_OR_RETURN(const auto model, Find(digest));
-  return model->eigenvalues;
+  std::vector<double> eigenvalues;
+  absl::Status status = database_->Read([&](SqliteConnection& connection) {
+    ASSIGN_OR_RETURN(const ModelSummary summary, SelectModel(connection, digest));
+    ASSIGN_OR_RETURN(eigenvalues, ReadEigenvalues(connection, summary));
+    return absl::OkStatus();
+  });
+  if (absl::IsDataLoss(status)) return Quarantine(digest, status);
+  RETURN_IF_ERROR(status);
+  return eigenvalues;
 }
 
 absl::StatusOr<ModelPage> ModelStore::List(const ModelFilter& filter, int page_size,

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,66 +16,20 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
-#include "carillon/v1/modal_model.pb.h"
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/base/mutex.h"
+#include "server/mode_database/listener.h"
 #include "server/mode_database/modal_model.h"
+#include "server/mode_database/model_codec.h"
+#include "server/mode_database/model_export.h"
+#include "server/mode_database/model_import.h"
+#include "server/mode_database/model_row.h"
 #include "server/mode_database/replacing.h"
 
 namespace carillon {
 
 class Database;
-class ModelFileReader;
-class SqliteConnection;
-
-/// Greatest length of a label. A longer label is cut.
-inline constexpr size_t kMaxLabelBytes = 200;
-
-/// Greatest number of tags of a model. A model to which an older version of Carillon gave more tags
-/// is returned with the first kMaxTagCount of them.
-inline constexpr size_t kMaxTagCount = 100;
-
-/// Greatest size of the header of an imported model. A page of a list ends when its headers have
-/// this size, so that every client can receive it.
-inline constexpr size_t kMaxHeaderBytes = size_t{1} << 20U;
-
-/// Greatest number of modes of an imported model. A decomposition finds no more.
-inline constexpr uint32_t kMaxImportedModeCount = 20'000;
-
-/// A modal model without its arrays.
-struct ModelSummary {
-  std::string digest{};
-  std::string label{};  ///< given when it was first stored, or changed since
-  v1::ModalModelHeader header{};
-  uint64_t stored_bytes = 0;  ///< of its arrays
-  int64_t created_unix_ms = 0;
-  int64_t revision = 0;  ///< greater for everything stored later
-  bool pinned = false;   ///< garbage collection leaves it alone
-  int64_t sounded_unix_ms = 0;
-  std::vector<std::string> tags{};  ///< ascending
-  /// The material of the newest request for the model. It is absent if the model was imported.
-  std::optional<v1::Material> material{};
-};
-
-/// Selects the models of a list: those that match all of the fields.
-struct ModelFilter {
-  std::string label_contains{};  ///< in upper or lower case
-  std::string tag{};
-  int64_t min_stored_bytes = 0;
-  int64_t max_stored_bytes = std::numeric_limits<int64_t>::max();
-  int64_t created_since_unix_ms = 0;
-  int64_t created_before_unix_ms = std::numeric_limits<int64_t>::max();
-};
-
-/// A change of a model. Absent properties stay as they are.
-struct ModelChange {
-  std::optional<std::string> label{};
-  std::vector<std::string> add_tags{};
-  std::vector<std::string> remove_tags{};
-  std::optional<bool> pinned{};
-  std::optional<v1::Material> material{};
-};
 
 /// The models that a garbage collection deleted.
 struct Collected {
@@ -108,60 +61,6 @@ struct ModelPage {
   std::string next_page_token;  ///< empty after the last page
 };
 
-class ModelStore;
-
-/// A model that arrives record by record. Each record is checked when it comes. Only one thread at
-/// a time may use an object.
-class ModelImport {
- public:
-  ModelImport(ModelImport&&) noexcept;
-  ModelImport& operator=(ModelImport&&) noexcept;
-  ~ModelImport();
-
-  /// Takes the next record. Errors: InvalidArgument (MODAL_MODEL_MALFORMED), DataLoss
-  /// (MODAL_MODEL_CORRUPT: a hash is wrong), ResourceExhausted (MODAL_MODEL_TOO_LARGE).
-  absl::Status Append(const v1::ModalModelRecord& record);
-
-  /// Stores the model durably. No record may follow. If a model with the same records is stored
-  /// under the same digest, the stored model is returned, and nothing is changed. Errors:
-  /// InvalidArgument (MODAL_MODEL_MALFORMED: records are missing), AlreadyExists
-  /// (MODAL_MODEL_EXISTS: the stored model has other records and may not be replaced).
-  absl::StatusOr<ModelSummary> Finish();
-
-  /// Returns whether Finish has found the same model stored.
-  bool kept() const;
-
- private:
-  friend class ModelStore;
-  struct State;
-  explicit ModelImport(std::unique_ptr<State> state);
-
-  std::unique_ptr<State> state_;
-};
-
-/// Reads a stored model record by record, byte for byte. No transaction stays open between two
-/// records, so an export ends with an error if the model is replaced. Only one thread at a time may
-/// use an object.
-class ModelExport {
- public:
-  /// Returns the next record, or nullopt after the last one. Errors: DataLoss (MODAL_MODEL_CORRUPT,
-  /// and the model goes into quarantine), Aborted (MODAL_MODEL_REPLACED: replaced or deleted
-  /// meanwhile).
-  absl::StatusOr<std::optional<v1::ModalModelRecord>> Next();
-
- private:
-  friend class ModelStore;
-  ModelExport(Database& database, ModelStore& store, ModelSummary summary)
-      : database_(&database), store_(&store), summary_(std::move(summary)) {}
-
-  Database* database_;
-  ModelStore* store_;
-  ModelSummary summary_;
-  bool header_sent_ = false;
-  int64_t next_chunk_ = 0;
-  int64_t chunk_count_ = 0;
-};
-
 /// Stores modal models by digest. Safe from every thread.
 ///
 /// A model that turns out to be damaged goes into quarantine. Its rows stay unchanged for an
@@ -179,7 +78,7 @@ class ModelStore {
   void KeepWithin(ModelBudget budget) { budget_ = std::move(budget); }
 
   /// Replaces the listener. When the call returns, the old listener is not running, and it is never
-  /// called again.
+  /// called again. Must not be called by a listener.
   void ListenToQuarantine(OnQuarantine on_quarantine);
 
   /// Stores the model of a file in the stored form, in one transaction. The model is durable when
@@ -219,7 +118,7 @@ class ModelStore {
   absl::StatusOr<ModelSummary> Summary(const std::string& digest);
 
   /// Returns the eigenvalues for a Young's modulus of 1 Pa and a density of 1 kg/m^3, ascending.
-  /// Errors: those of Find.
+  /// Reads and checks nothing else of the model. Errors: those of Find.
   absl::StatusOr<std::vector<double>> Eigenvalues(const std::string& digest);
 
   /// Returns the models, newest first, at most 1000 a page. A `page_size` of 0 means 100. A page
@@ -249,13 +148,6 @@ class ModelStore {
   absl::StatusOr<Collected> Collect(uint64_t budget_bytes, const CollectSettings& settings = {});
 
  private:
-  friend class ModelExport;
-  friend class ModelImport;
-  struct Cached {
-    int64_t revision = 0;
-    std::weak_ptr<const ModalModel> model;
-  };
-
   absl::StatusOr<std::shared_ptr<const ModalModel>> Load(const std::string& digest);
   /// Deletes at most `most` models in one transaction.
   absl::StatusOr<Collected> CollectSome(uint64_t budget_bytes, const CollectSettings& settings,
@@ -266,23 +158,29 @@ class ModelStore {
   absl::StatusOr<ModelSummary> Store(absl::FunctionRef<absl::StatusOr<ModelFileReader>()> open,
                                      ModelSummary named, Replacing replacing, bool* kept);
   absl::Status Quarantine(const std::string& digest, const absl::Status& why);
-  bool InMemory(const std::string& digest) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
+  /// Returns the mutex that is locked while the model is read, so that two objects of one model do
+  /// not both read it.
+  std::shared_ptr<Mutex> LatchOf(const std::string& digest);
+  /// Returns the model if this revision of it is in memory.
+  std::shared_ptr<const ModalModel> Cached(const std::string& digest, int64_t revision);
+  /// Returns when models sounded last, as far as that is not stored yet.
+  std::map<std::string, int64_t> Sounded();
+  /// Whether the model is in memory or is being read.
+  bool InMemory(const std::string& digest);
   /// Sets the time at which the model sounded last, if that is not stored yet.
   void AddSounded(ModelSummary& summary);
-  absl::Status WriteSounded(SqliteConnection& connection)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_);
 
   Database* database_;
   const Clock* clock_;
   ModelBudget budget_;
-  // Locked while a model is read, so that two objects of one model do not both read it.
+  // Never locked while the disk is read or written.
   Mutex cache_mutex_;
-  std::map<std::string, Cached> cache_ ABSL_GUARDED_BY(cache_mutex_);
+  std::map<std::string, std::weak_ptr<const ModalModel>> cache_ ABSL_GUARDED_BY(cache_mutex_);
+  std::map<std::string, std::weak_ptr<Mutex>> latches_ ABSL_GUARDED_BY(cache_mutex_);
   // When models sounded last. The next collection stores it, because an object that begins to sound
   // must not wait for the disk.
   std::map<std::string, int64_t> sounded_ ABSL_GUARDED_BY(cache_mutex_);
-  Mutex listener_mutex_;
-  OnQuarantine on_quarantine_ ABSL_GUARDED_BY(listener_mutex_);
+  Listener<const std::string&, const absl::Status&> on_quarantine_;
 };
 
 }  // namespace carillon

@@ -8,7 +8,6 @@
 #include "absl/functional/function_ref.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/model_format.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/database.h"
@@ -74,18 +73,8 @@ absl::Status WithModel(Database& database, const std::string& digest,
 /// Errors: InvalidArgument (TRANSFER_MALFORMED).
 absl::Status CheckModes(SqliteConnection& connection, const ModelSummary& model,
                         const StoredTransfer& transfer) {
-  std::string stored;
-  RETURN_IF_ERROR(connection.Query(
-      "SELECT data FROM model_chunks WHERE revision = ? AND array = ? ORDER BY number",
-      {model.revision, static_cast<int64_t>(ModelArrayIndex("eigenvalues"))},
-      [&](const SqlRow& chunk) {
-        stored += chunk.Blob(0);
-        return absl::OkStatus();
-      }));
-  const std::vector<double> eigenvalues = transfer.Eigenvalues();
-  const std::string_view own(reinterpret_cast<const char*>(eigenvalues.data()),
-                             eigenvalues.size() * sizeof(double));
-  if (own == stored) return absl::OkStatus();
+  ASSIGN_OR_RETURN(const std::vector<double> stored, ReadEigenvalues(connection, model));
+  if (transfer.Eigenvalues() == stored) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
                  absl::StrCat("the modes of the transfer are not those of modalModels/",
                               model.digest, ": compute it for this model"));
@@ -130,10 +119,7 @@ absl::StatusOr<bool> IsTransferStored(SqliteConnection& connection, const ModelS
 
 int64_t SpeedStep(double speed_ratio) { return std::llround(100 * std::log(speed_ratio)); }
 
-void TransferStore::Listen(OnStored on_stored) {
-  MutexLock lock(&listener_mutex_);
-  on_stored_ = std::move(on_stored);
-}
+void TransferStore::Listen(OnStored on_stored) { on_stored_.Replace(std::move(on_stored)); }
 
 absl::StatusOr<TransferSummary> TransferStore::Put(const std::string& model_digest,
                                                    const StoredTransfer& transfer,
@@ -147,8 +133,7 @@ absl::StatusOr<TransferSummary> TransferStore::Put(const std::string& model_dige
     ASSIGN_OR_RETURN(const bool stored, IsTransferStored(connection, model, transfer, replacing));
     return stored ? absl::OkStatus() : Insert(connection, model.revision, transfer, summary);
   }));
-  MutexLock lock(&listener_mutex_);
-  if (on_stored_) on_stored_(model_digest);
+  on_stored_.Call(model_digest);
   return summary;
 }
 

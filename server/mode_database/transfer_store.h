@@ -16,6 +16,7 @@
 #include "carillon/v1/transfer.pb.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
+#include "server/mode_database/listener.h"
 #include "server/mode_database/modal_model.h"
 #include "server/mode_database/replacing.h"
 #include "server/mode_database/transfer.h"
@@ -50,13 +51,13 @@ class TransferStore {
   /// the power then differs by up to 2 dB.
   static constexpr double kSpeedTolerance = 0.05;
 
-  /// Called after each transfer that is stored, without a lock of the database.
+  /// Called after each transfer that is stored. The store holds no lock during the call.
   using OnStored = std::function<void(const std::string& model_digest)>;
 
   TransferStore(Database& database, const Clock& clock) : database_(&database), clock_(&clock) {}
 
   /// Replaces the listener. When the call returns, the old listener is not running, and it is never
-  /// called again.
+  /// called again. Must not be called by a listener.
   void Listen(OnStored on_stored);
 
   /// Stores a transfer of the model durably; replaces a transfer with the same step number. Without
@@ -89,8 +90,7 @@ class TransferStore {
 
   Database* database_;
   const Clock* clock_;
-  Mutex listener_mutex_;
-  OnStored on_stored_ ABSL_GUARDED_BY(listener_mutex_);
+  Listener<const std::string&> on_stored_;
   Mutex cache_mutex_;
   std::map<Key, std::pair<int64_t, std::weak_ptr<const Transfer>>> cache_
       ABSL_GUARDED_BY(cache_mutex_);  // each transfer with the hash of its bytes

@@ -61,10 +61,6 @@ class BitFlipCampaign(unittest.TestCase):
         data[self.rng.randrange(size)] ^= 1 << self.rng.randrange(8)
         database.execute(f"UPDATE {table} SET {column} = ? WHERE rowid = ?", (bytes(data), row))
 
-    def load(self, model):
-        return self.client.models.GetModalModel(
-            modal_model_service_pb2.GetModalModelRequest(name=model)).modal_model
-
     def exported(self, model):
         return [answer.record for answer in self.client.models.ExportModalModel(
             modal_model_service_pb2.ExportModalModelRequest(name=model))]
@@ -78,7 +74,7 @@ class BitFlipCampaign(unittest.TestCase):
             model = self.rng.choice(models)
             self.flip(database, model)
             with self.assertRaises(grpc.RpcError) as refused:
-                self.load(model)
+                self.exported(model)
             found += refused.exception.code() == grpc.StatusCode.DATA_LOSS
             self.assertIn("MODAL_MODEL_CORRUPT", refused.exception.details())
             self.wait(model)

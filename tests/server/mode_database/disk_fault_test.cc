@@ -5,11 +5,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "server/base/sha256.h"
+#include "server/mode_database/database.h"
 #include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/faulty_vfs.h"
@@ -175,6 +177,28 @@ TEST_P(ReadErrorTest, AModelThatCannotBeReadNowIsNotTakenForDamaged) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Disk, ReadErrorTest, ::testing::Values(DiskFault::kReadError));
+
+TEST(TemporaryFolder, NeedsNoSpaceForAnyChange) {
+  const TemporaryFolder folder;
+  WriteRecords(folder / "model", SampleRecords(SampleModel(200, 5000)));
+  const FaultyDisk disk;
+  const SystemClock clock;
+  FaultyDisk::SetTemporaryFolderFull(true);
+  const std::unique_ptr<ModeDatabase> database = *ModeDatabase::Open(folder / "carillon.db", clock);
+  ModelStore& models = database->models();
+  const std::string a = Sha256Hex("a"), b = Sha256Hex("b");
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(models.PutFile(a, "a", folder / "model").status(), absl::OkStatus());
+  }
+  EXPECT_EQ(models.CopyIfAbsent(a, b, "b"), absl::OkStatus());
+  EXPECT_EQ(models.Update(a, {.label = "c", .add_tags = {"bell", "bronze"}}).status(),
+            absl::OkStatus());
+  EXPECT_EQ(database->meshes().Put(std::string(4 << 20, 'x')).status(), absl::OkStatus());
+  EXPECT_EQ(models.Delete(a), absl::OkStatus());
+  EXPECT_EQ(models.Collect(0).status(), absl::OkStatus());
+  EXPECT_EQ(database->meshes().Collect(std::chrono::milliseconds(-1)).status(), absl::OkStatus());
+  EXPECT_EQ(database->database().Tidy(), absl::OkStatus());
+}
 
 TEST(DatabaseMemory, ALackOfItIsSaid) {
   const TemporaryFolder folder;

@@ -29,7 +29,7 @@ bool Fails(bool write) {
   return true;
 }
 
-/// The writes that wait until the test releases them.
+/// The accesses that wait until the test releases them.
 class Latch {
  public:
   void HoldAfter(int64_t count) {
@@ -66,6 +66,9 @@ class Latch {
 };
 
 Latch latch;
+Latch read_latch;
+thread_local bool holds_reads = false;
+std::atomic<bool> temporary_folder_is_full = false;
 
 /// The methods of a file, with those that write replaced; SQLite's own lie behind.
 struct Methods {
@@ -86,6 +89,7 @@ int Write(sqlite3_file* file, const void* data, int size, sqlite3_int64 offset) 
 }
 
 int Read(sqlite3_file* file, void* data, int size, sqlite3_int64 offset) {
+  if (holds_reads) read_latch.Pass();
   return Fails(false) ? SQLITE_IOERR_READ : Real(file).xRead(file, data, size, offset);
 }
 
@@ -126,6 +130,7 @@ sqlite3_vfs* real_vfs = nullptr;
 sqlite3_vfs faulty_vfs;
 
 int Open(sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* out_flags) {
+  if (temporary_folder_is_full && (flags & SQLITE_OPEN_DELETEONCLOSE) != 0) return SQLITE_FULL;
   const int result = real_vfs->xOpen(real_vfs, name, file, flags, out_flags);
   if (result == SQLITE_OK) file->pMethods = Wrapped(file->pMethods);
   return result;
@@ -144,6 +149,8 @@ FaultyDisk::FaultyDisk() {
 FaultyDisk::~FaultyDisk() {
   Repair();
   ReleaseWrites();
+  ReleaseReads();
+  SetTemporaryFolderFull(false);
   sqlite3_vfs_unregister(&faulty_vfs);
   sqlite3_vfs_register(real_vfs, 1);
 }
@@ -164,6 +171,17 @@ void FaultyDisk::HoldWritesAfter(int64_t count) { latch.HoldAfter(count); }
 bool FaultyDisk::AwaitHeldWrite() { return latch.AwaitHeld(); }
 
 void FaultyDisk::ReleaseWrites() { latch.Release(); }
+
+void FaultyDisk::SetTemporaryFolderFull(bool is_full) { temporary_folder_is_full = is_full; }
+
+void FaultyDisk::HoldReadsOfThisThread() {
+  read_latch.HoldAfter(0);
+  holds_reads = true;
+}
+
+bool FaultyDisk::AwaitHeldRead() { return read_latch.AwaitHeld(); }
+
+void FaultyDisk::ReleaseReads() { read_latch.Release(); }
 
 void LimitDatabaseMemory(int64_t byte_count) { sqlite3_hard_heap_limit64(byte_count); }
 

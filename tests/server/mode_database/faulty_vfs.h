@@ -14,8 +14,8 @@ enum class DiskFault {
 };
 
 /// While it lives, every file that SQLite opens in this process is on a disk that fails, from a
-/// given access on until it is repaired, or that holds its writes until they are released. One at a
-/// time.
+/// given access on until it is repaired, or that holds its writes, or the reads of some threads,
+/// until they are released. One at a time.
 class FaultyDisk {
  public:
   FaultyDisk();
@@ -36,6 +36,17 @@ class FaultyDisk {
   static bool AwaitHeldWrite();
 
   static void ReleaseWrites();
+
+  /// Whether SQLite finds no space for its temporary files, as on a full $TMPDIR.
+  static void SetTemporaryFolderFull(bool is_full);
+
+  /// All reads of this thread wait for ReleaseReads.
+  static void HoldReadsOfThisThread();
+
+  /// Whether a read is held now, or comes to be held within a minute.
+  static bool AwaitHeldRead();
+
+  static void ReleaseReads();
 };
 
 /// Lets SQLite have only so much memory; zero removes the limit.
