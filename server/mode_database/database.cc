@@ -37,8 +37,10 @@ absl::StatusOr<std::unique_ptr<SqliteConnection>> Connect(const std::filesystem:
                                                           const char* first = kReader) {
   ASSIGN_OR_RETURN(auto connection, SqliteConnection::Open(file));
   RETURN_IF_ERROR(connection->RunScript(first));
+  // Without temporary files in $TMPDIR a change cannot fail because that is full.
   RETURN_IF_ERROR(connection->RunScript(
-      "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON;"));
+      "PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON; "
+      "PRAGMA temp_store = MEMORY;"));
   return connection;
 }
 
@@ -204,7 +206,8 @@ absl::Status Database::WriteToFree(absl::FunctionRef<absl::Status(SqliteConnecti
 }
 
 absl::Status Database::WriteLocked(absl::FunctionRef<absl::Status(SqliteConnection&)> body) {
-  absl::Status status = Change([&] { return InTransaction(*writer_, "BEGIN IMMEDIATE", body); });
+  absl::Status status =
+      Change([&writer = *writer_, body] { return InTransaction(writer, "BEGIN IMMEDIATE", body); });
   RememberFailure(status);
   return status;
 }

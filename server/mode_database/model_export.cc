@@ -18,10 +18,12 @@ ModelExport::ModelExport(Database& database, ModelSummary summary, Quarantine qu
 absl::StatusOr<ModelExport> ModelExport::Begin(Database& database, ModelSummary summary,
                                                Quarantine quarantine) {
   ModelExport result(database, std::move(summary), std::move(quarantine));
-  RETURN_IF_ERROR(database.Read([&](SqliteConnection& connection) {
-    ASSIGN_OR_RETURN(result.chunk_count_, CountChunks(connection, result.summary_.revision));
+  absl::Status status = database.Read([&](SqliteConnection& connection) {
+    ASSIGN_OR_RETURN(result.chunk_count_, CountChunks(connection, result.summary_));
     return absl::OkStatus();
-  }));
+  });
+  if (absl::IsDataLoss(status)) return result.quarantine_(status);
+  RETURN_IF_ERROR(status);
   return result;
 }
 

@@ -22,8 +22,8 @@ class ModelExport {
   /// Puts the model into quarantine. Returns the error for the reader.
   using Quarantine = std::function<absl::Status(const absl::Status& why)>;
 
-  /// Begins with the header of `summary`. `database` must outlive the object. Errors: those of
-  /// Database::Read.
+  /// Begins with the header of `summary`. `database` must outlive the object. Errors: DataLoss
+  /// (MODAL_MODEL_CORRUPT: chunks are missing, and the model goes into quarantine).
   static absl::StatusOr<ModelExport> Begin(Database& database, ModelSummary summary,
                                            Quarantine quarantine);
 

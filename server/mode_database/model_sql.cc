@@ -330,13 +330,18 @@ absl::StatusOr<bool> QuarantineModel(SqliteConnection& connection, const std::st
   return connection.changed_row_count() > 0;
 }
 
-absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, int64_t revision) {
+absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, const ModelSummary& summary) {
   int64_t count = 0;
-  RETURN_IF_ERROR(connection.Query("SELECT count(*) FROM model_chunks WHERE revision = ?",
-                                   {revision}, [&](const SqlRow& row) {
-                                     count = row.Int(0);
-                                     return absl::OkStatus();
-                                   }));
+  uint64_t stored_bytes = 0;
+  RETURN_IF_ERROR(connection.Query(
+      "SELECT count(*), coalesce(sum(length(data)), 0) FROM model_chunks WHERE revision = ?",
+      {summary.revision}, [&](const SqlRow& row) {
+        count = row.Int(0);
+        stored_bytes = static_cast<uint64_t>(row.Int(1));
+        return absl::OkStatus();
+      }));
+  if (stored_bytes != summary.stored_bytes)
+    return ModelCorrupt(summary.digest, "chunks are missing");
   return count;
 }
 

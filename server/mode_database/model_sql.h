@@ -75,7 +75,8 @@ absl::Status StoreSounded(SqliteConnection& connection, const std::string& diges
 /// Puts the model into quarantine. Returns false if it was there already.
 absl::StatusOr<bool> QuarantineModel(SqliteConnection& connection, const std::string& digest);
 
-absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, int64_t revision);
+/// Returns the number of the model's chunks, after checking that none is missing.
+absl::StatusOr<int64_t> CountChunks(SqliteConnection& connection, const ModelSummary& summary);
 
 /// Calls `on_model` for all models. The models that sounded (or, if they never sounded, were
 /// stored) longest ago come first.

@@ -102,7 +102,7 @@ class ModelStore {
   absl::StatusOr<ModelImport> Import(const std::string& digest, const std::string& label,
                                      Replacing replacing = Replacing::kNever);
 
-  /// Begins an export. Errors: NotFound (MODAL_MODEL_NOT_FOUND).
+  /// Begins an export. Errors: NotFound (MODAL_MODEL_NOT_FOUND), DataLoss (MODAL_MODEL_CORRUPT).
   absl::StatusOr<ModelExport> Export(const std::string& digest);
 
   /// Returns the whole model. All objects share one copy in memory. Errors: NotFound

@@ -14,6 +14,7 @@
 
 #include "server/base/sha256.h"
 #include "server/mode_database/mode_database.h"
+#include "server/mode_database/sqlite_connection.h"
 #include "tests/server/mode_database/faulty_vfs.h"
 #include "tests/server/mode_database/sample_model.h"
 
@@ -73,8 +74,9 @@ TEST_F(ModelLoadingTest, AModelThatIsBeingReadKeepsOnlyItsOwnReadersWaiting) {
   ASSERT_TRUE(FaultyDisk::AwaitHeldRead());
   std::future<bool> same = std::async(std::launch::async, [&] { return models.Find(a_).ok(); });
   std::future<bool> others = std::async(std::launch::async, [&] {
-    return models.Summary(a_).ok() && models.List({}, 0, "").ok() && models.FindToSound(b_).ok() &&
-           models.Collect(0)->model_count == 1;
+    const bool found =
+        models.Summary(a_).ok() && models.List({}, 0, "").ok() && models.FindToSound(b_).ok();
+    return found && models.Collect(0)->model_count == 1;
   });
   EXPECT_EQ(others.wait_for(kDeadline), std::future_status::ready);
   EXPECT_EQ(same.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
@@ -102,6 +104,15 @@ TEST_F(ModelLoadingTest, EigenvaluesAreReadWithoutTheRest) {
   EXPECT_EQ(*database_->models().Eigenvalues(a_), model_.eigenvalues);
   EXPECT_TRUE(absl::IsDataLoss(database_->models().Find(a_).status()));
   EXPECT_TRUE(absl::IsDataLoss(database_->models().Eigenvalues(a_).status()));
+}
+
+TEST_F(ModelLoadingTest, AModelWithoutItsLastChunkIsNotExported) {
+  ASSERT_TRUE((*SqliteConnection::Open(file_))
+                  ->RunScript("DELETE FROM model_chunks WHERE rowid = "
+                              "(SELECT max(rowid) FROM model_chunks)")
+                  .ok());
+  EXPECT_TRUE(database_->models().Export(a_).ok());
+  EXPECT_TRUE(absl::IsDataLoss(database_->models().Export(b_).status()));
 }
 
 TEST_F(ModelLoadingTest, AListenerThatWaitsKeepsNoOtherQuarantineWaiting) {
