@@ -15,9 +15,9 @@
 #include "server/base/sha256.h"
 #include "server/decomposition/random_digits.h"
 #include "server/decomposition/worker_events.h"
-#include "server/mode_database/model_checker.h"
-#include "server/mode_database/model_codec.h"
-#include "server/mode_database/transfer_codec.h"
+#include "server/mode_database/codec/model_checker.h"
+#include "server/mode_database/codec/model_codec.h"
+#include "server/mode_database/codec/transfer_codec.h"
 
 namespace carillon {
 namespace {

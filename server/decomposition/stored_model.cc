@@ -10,7 +10,7 @@
 #include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_request.h"
 #include "server/decomposition/job_rules.h"
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/model_codec.h"
 
 namespace carillon {
 namespace {

@@ -13,7 +13,7 @@
 #include "server/base/sha256.h"
 #include "server/base/usable_memory.h"
 #include "server/base/xxh3.h"
-#include "server/mode_database/model_checker.h"
+#include "server/mode_database/codec/model_checker.h"
 #include "server/mode_database/model_sql.h"
 
 namespace carillon {

@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model.pb.h"
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/model_codec.h"
 #include "server/mode_database/model_row.h"
 #include "server/mode_database/replacing.h"
 #include "server/mode_database/spool_file.h"

@@ -11,7 +11,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
-#include "server/mode_database/model_checker.h"
+#include "server/mode_database/codec/model_checker.h"
 #include "server/mode_database/utf8_prefix.h"
 
 namespace carillon {

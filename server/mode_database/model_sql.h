@@ -11,8 +11,8 @@
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
 #include "carillon/v1/modal_model.pb.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/model_codec.h"
 #include "server/mode_database/model_row.h"
 #include "server/mode_database/sqlite_connection.h"
 

@@ -19,9 +19,9 @@
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/base/mutex.h"
-#include "server/mode_database/listener.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/model_codec.h"
+#include "server/base/replaceable_callback.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/model_codec.h"
 #include "server/mode_database/model_export.h"
 #include "server/mode_database/model_import.h"
 #include "server/mode_database/model_row.h"
@@ -180,7 +180,7 @@ class ModelStore {
   // When models sounded last. The next collection stores it, because an object that begins to sound
   // must not wait for the disk.
   std::map<std::string, int64_t> sounded_ ABSL_GUARDED_BY(cache_mutex_);
-  Listener<const std::string&, const absl::Status&> on_quarantine_;
+  ReplaceableCallback<const std::string&, const absl::Status&> on_quarantine_;
 };
 
 }  // namespace carillon

@@ -16,11 +16,11 @@
 #include "carillon/v1/transfer.pb.h"
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
-#include "server/mode_database/listener.h"
-#include "server/mode_database/modal_model.h"
+#include "server/base/replaceable_callback.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/transfer.h"
+#include "server/mode_database/codec/transfer_codec.h"
 #include "server/mode_database/replacing.h"
-#include "server/mode_database/transfer.h"
-#include "server/mode_database/transfer_codec.h"
 
 namespace carillon {
 
@@ -90,7 +90,7 @@ class TransferStore {
 
   Database* database_;
   const Clock* clock_;
-  Listener<const std::string&> on_stored_;
+  ReplaceableCallback<const std::string&> on_stored_;
   Mutex cache_mutex_;
   std::map<Key, std::pair<int64_t, std::weak_ptr<const Transfer>>> cache_
       ABSL_GUARDED_BY(cache_mutex_);  // each transfer with the hash of its bytes

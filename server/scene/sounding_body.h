@@ -11,7 +11,7 @@
 #include "server/excitation/sharp_edges.h"
 #include "server/excitation/surface_curvature.h"
 #include "server/excitation/surface_locator.h"
-#include "server/mode_database/modal_model.h"
+#include "server/mode_database/codec/modal_model.h"
 #include "server/synthesis/bank/shape_table.h"
 
 namespace carillon {

@@ -7,8 +7,8 @@
 
 #include "absl/status/statusor.h"
 #include "server/base/pose.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/transfer.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/transfer.h"
 #include "server/mode_database/transfer_store.h"
 #include "server/scene/sounding_body.h"
 #include "server/synthesis/bank/oscillator_bank.h"

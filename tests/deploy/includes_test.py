@@ -26,7 +26,7 @@ class Includes(TreeTest):
 
     def test_clients_and_precompute_never_include_the_server(self):
         self.write("client_sdk/cpp/client.cc", '#include "server/base/clock.h"\n')
-        self.write("precompute/codec.cc", '#include "server/mode_database/modal_model.h"\n')
+        self.write("precompute/codec.cc", '#include "server/mode_database/codec/modal_model.h"\n')
         self.assert_found(check_includes.check(self.root), "precompute/codec.cc:1",
                           "client_sdk/cpp/client.cc:1")
 

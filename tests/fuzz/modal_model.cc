@@ -6,7 +6,7 @@
 #include <string>
 
 #include "server/base/xxh3.h"
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/model_codec.h"
 #include "tests/fuzz/memory_file.h"
 
 namespace carillon {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/mode_database/transfer_codec.h"
+#include "server/mode_database/codec/transfer_codec.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto stored =

@@ -16,8 +16,8 @@
 #include "server/api/call/send_call.h"
 #include "server/api/convert/resource_name.h"
 #include "server/api/services/transfer_spool.h"
+#include "server/mode_database/codec/imported_figures.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/imported_figures.h"
 
 namespace carillon {
 namespace {

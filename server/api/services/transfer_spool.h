@@ -9,9 +9,9 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "server/mode_database/codec/transfer_codec.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/spool_file.h"
-#include "server/mode_database/transfer_codec.h"
 
 namespace carillon {
 

@@ -31,8 +31,8 @@
 #include "absl/strings/str_cat.h"
 #include "server/base/clock.h"
 #include "server/base/sha256.h"
+#include "server/mode_database/codec/model_codec.h"
 #include "server/mode_database/mode_database.h"
-#include "server/mode_database/model_codec.h"
 
 namespace carillon {
 namespace {

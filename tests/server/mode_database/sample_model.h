@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/model_codec.h"
 
 namespace carillon {
 

@@ -10,8 +10,8 @@
 
 #include "proto/cpp/transfer_format.h"
 #include "server/base/xxh3.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/transfer_codec.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/transfer_codec.h"
 
 namespace carillon {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/mode_database/modal_model.h"
+#include "server/mode_database/codec/modal_model.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/sounding_object.h"
 

@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "carillon/v1/transfer.pb.h"
 #include "proto/cpp/transfer_format.h"
-#include "server/mode_database/transfer.h"
+#include "server/mode_database/codec/transfer.h"
 
 namespace carillon {
 

@@ -11,8 +11,8 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model.pb.h"
-#include "server/mode_database/modal_model.h"
-#include "server/mode_database/model_checker.h"
+#include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/model_checker.h"
 
 namespace carillon {
 

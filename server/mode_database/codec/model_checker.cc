@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/model_checker.h"
+#include "server/mode_database/codec/model_checker.h"
 
 #include <algorithm>
 #include <cmath>

@@ -13,7 +13,7 @@ namespace carillon {
 
 /// A function that is called without a lock and can be replaced meanwhile. Safe from every thread.
 template <typename... Arguments>
-class Listener {
+class ReplaceableCallback {
  public:
   using Function = std::function<void(Arguments...)>;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/imported_figures.h"
+#include "server/mode_database/codec/imported_figures.h"
 
 #include <algorithm>
 #include <cmath>

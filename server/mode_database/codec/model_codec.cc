@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/mode_database/model_codec.h"
+#include "server/mode_database/codec/model_codec.h"
 
 #include <fcntl.h>
 #include <google/protobuf/io/coded_stream.h>
