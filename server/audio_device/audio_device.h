@@ -24,19 +24,25 @@ struct DeviceFormat {
 /// A device that plays sound. A new kind of device is a new implementation of this interface and a
 /// line in open_device.cc.
 ///
-/// One thread calls Start, Check, Stop and the destructor; any thread may call the others.
+/// One thread at a time calls Start, Check, Stop and the destructor; any thread may call the
+/// others.
 class AudioDevice {
  public:
   /// Stops the device.
   virtual ~AudioDevice() = default;
 
   /// Begins to pull from `source`, which must live until Stop has returned. Start returns quickly,
-  /// because all slow steps are done when the device is opened.
+  /// because all slow steps are done when the device is opened. A device that discards may be
+  /// started again after Stop.
   virtual absl::Status Start(FrameSource& source) = 0;
 
   /// Ends pulling. The device does not use the source after Stop has returned. Stop may be called
   /// twice.
   virtual void Stop() = 0;
+
+  /// Returns whether all frames are thrown away, so that the device may be stopped while nobody
+  /// waits for its source.
+  virtual bool discards() const { return false; }
 
   /// "portaudio: NAME", "null" or "file: PATH".
   virtual std::string description() const = 0;

@@ -30,6 +30,7 @@ class ClockedDevice final : public AudioDevice {
 
   absl::Status Start(FrameSource& source) override;
   void Stop() override;
+  bool discards() const override { return sink_ == nullptr; }
   std::string description() const override { return description_; }
   double latency_s() const override { return 0; }
   absl::Status Check() override;

@@ -20,7 +20,7 @@ LookAhead::~LookAhead() { Stop(); }
 
 absl::Status LookAhead::Start() {
   stopping_ = false;
-  for (uint32_t block = 0; block < block_count_; ++block) RenderOne();
+  FillUp();
   thread_ = std::thread([this] { Run(); });
   return MakeRealtime(thread_);
 }
@@ -38,9 +38,13 @@ void LookAhead::Run() {
   const auto half_block =
       std::chrono::nanoseconds(500'000'000ULL * format_.block_frame_count / format_.sample_rate_hz);
   while (!stopping_) {
-    while (rendered_.frames().free_count() >= format_.block_size() && !stopping_) RenderOne();
+    FillUp();
     clock_.SleepUntil(clock_.Monotonic() + half_block);
   }
+}
+
+void LookAhead::FillUp() {
+  while (rendered_.frames().free_count() >= format_.block_size() && !stopping_) RenderOne();
 }
 
 void LookAhead::RenderOne() {

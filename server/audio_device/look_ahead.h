@@ -30,8 +30,8 @@ class LookAhead final {
   LookAhead(const LookAhead&) = delete;
   LookAhead& operator=(const LookAhead&) = delete;
 
-  /// Fills the ring buffer, then starts the thread. If the system refuses real-time priority, the
-  /// thread runs without that priority and the refusal is returned.
+  /// Fills the ring buffer, then starts the thread, also again after Stop. If the system refuses
+  /// real-time priority, the thread runs without that priority and the refusal is returned.
   absl::Status Start();
 
   /// Joins the thread.
@@ -55,6 +55,7 @@ class LookAhead final {
 
  private:
   void Run();
+  void FillUp();
   void RenderOne();
 
   const DeviceFormat format_;

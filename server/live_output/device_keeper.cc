@@ -11,6 +11,8 @@ namespace carillon {
 namespace {
 
 constexpr std::chrono::milliseconds kCheckPeriod(20);
+/// The period while the null device plays in place of the wanted one, and needs no check.
+constexpr std::chrono::milliseconds kNullPeriod(100);
 /// A sound server that has come back plays after at most this period and the time to open a device.
 constexpr std::chrono::milliseconds kTryPeriod(500);
 
@@ -29,18 +31,20 @@ std::string NoSound(const absl::Status& status) {
 
 absl::StatusOr<std::unique_ptr<DeviceKeeper>> DeviceKeeper::Start(const DeviceSettings& settings,
                                                                   FrameSource& source, Clock& clock,
-                                                                  Log log) {
-  std::unique_ptr<DeviceKeeper> keeper(new DeviceKeeper(settings, source, clock, std::move(log)));
+                                                                  Log log, Wake wake) {
+  std::unique_ptr<DeviceKeeper> keeper(
+      new DeviceKeeper(settings, source, clock, std::move(log), std::move(wake)));
   RETURN_IF_ERROR(keeper->Begin());
   return keeper;
 }
 
 DeviceKeeper::DeviceKeeper(const DeviceSettings& settings, FrameSource& source, Clock& clock,
-                           Log log)
+                           Log log, Wake wake)
     : settings_(settings),
       source_(source),
       clock_(clock),
       log_(std::move(log)),
+      wake_(std::move(wake)),
       missed_(settings.specification != "auto") {}
 
 DeviceKeeper::~DeviceKeeper() {
@@ -56,7 +60,9 @@ absl::Status DeviceKeeper::Begin() {
   if (status.ok()) status = (*wanted)->Start(source_);
   if (!status.ok() && !MayAppear(status)) return status;
   if (status.ok()) {
+    const bool needs_no_keeper = (*wanted)->discards();
     Install(*std::move(wanted), true);
+    if (needs_no_keeper) return absl::OkStatus();
   } else {
     std::unique_ptr<AudioDevice> null = OpenNullDevice(settings_.format, clock_);
     RETURN_IF_ERROR(null->Start(source_));
@@ -86,7 +92,8 @@ void DeviceKeeper::Observe(Observer observer) {
 void DeviceKeeper::Run() {
   while (!stopping_) {
     CheckDevice();
-    clock_.SleepUntil(clock_.Monotonic() + kCheckPeriod);
+    const auto period = device().discards() ? kNullPeriod : kCheckPeriod;
+    clock_.SleepUntil(clock_.Monotonic() + period);
   }
 }
 
@@ -99,13 +106,18 @@ void DeviceKeeper::CheckDevice() {
     wanted = wanted_;
   }
   if (!wanted) return TryWanted();
-  if (absl::IsUnavailable(status)) PlayOnNull();
+  if (absl::IsUnavailable(status)) {
+    const MutexLock lock(&change_mutex_);
+    PlayOnNull();
+  }
   Note(status.ok() ? "" : ToErrorInfo(status).message());
 }
 
+/// Stops the present device before another starts, because two devices must not pull from the
+/// source at the same time.
 void DeviceKeeper::PlayOnNull() {
   std::unique_ptr<AudioDevice> null = OpenNullDevice(settings_.format, clock_);
-  StopDevice();
+  device().Stop();
   null->Start(source_).IgnoreError();  // a null device always starts
   Install(std::move(null), false);
 }
@@ -119,27 +131,43 @@ void DeviceKeeper::TryWanted() {
     message_ = NoSound(device.status());  // not logged, because it may change with each attempt
     return;
   }
-  StopDevice();
-  if (const absl::Status status = (*device)->Start(source_); status.ok()) {
-    Install(*std::move(device), true);
-    Note("");
-  } else {
-    device->reset();
-    PlayOnNull();
-  }
+  if (wake_) wake_();
+  PlayOnWanted(*std::move(device));
 }
 
-/// Stops the present device before another starts, because two devices must not pull from the
-/// source at the same time.
-void DeviceKeeper::StopDevice() {
-  AudioDevice* device = nullptr;
+void DeviceKeeper::PlayOnWanted(std::unique_ptr<AudioDevice> wanted) {
   {
-    const MutexLock lock(&mutex_);
-    device = device_.get();
+    const MutexLock lock(&change_mutex_);
+    device().Stop();
+    if (!wanted->Start(source_).ok()) {
+      wanted.reset();
+      return PlayOnNull();
+    }
+    Install(std::move(wanted), true);
   }
-  // The lock is not held, because Stop takes up to half a second. Only this thread replaces the
-  // device.
-  device->Stop();
+  Note("");
+}
+
+bool DeviceKeeper::Pause() {
+  const MutexLock lock(&change_mutex_);
+  if (!device().discards()) return false;
+  device().Stop();
+  paused_ = true;
+  return true;
+}
+
+void DeviceKeeper::Resume() {
+  const MutexLock lock(&change_mutex_);
+  if (!std::exchange(paused_, false)) return;
+  device().Start(source_).IgnoreError();  // a null device always starts
+}
+
+/// Returns the present device. It stays while change_mutex_ is held, and on the keeper's thread,
+/// which alone replaces it. mutex_ is not held while the device stops, because that takes up to
+/// half a second.
+AudioDevice& DeviceKeeper::device() const {
+  const MutexLock lock(&mutex_);
+  return *device_;
 }
 
 void DeviceKeeper::Install(std::unique_ptr<AudioDevice> device, bool wanted) {

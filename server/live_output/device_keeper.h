@@ -35,20 +35,23 @@ struct DeviceState {
 ///
 ///     wanted device plays --Check fails--> null pulls --opened and started--> wanted device plays
 ///
-/// The keeper has its own thread, because opening a device may take seconds.
+/// The keeper has its own thread, because opening a device may take seconds. If the null device was
+/// asked for, there is nothing to keep, and no thread.
 class DeviceKeeper {
  public:
   /// Takes a line of text for the operator, whenever the fault of the device changes.
   using Log = std::function<void(const std::string&)>;
   /// Takes DeviceState::plays when it may have changed.
   using Observer = std::function<void(bool plays)>;
+  /// Called before the wanted device begins to pull, after Pause perhaps.
+  using Wake = std::function<void()>;
 
   /// Plays `source`. `source` and `clock` must outlive the keeper. If a sound card does not exist
   /// yet, the keeper waits for it. Errors: InvalidArgument (INVALID_AUDIO_DEVICE),
   /// FailedPrecondition (AUDIO_FILE_FAILED, WORKER_NOT_FOUND).
   static absl::StatusOr<std::unique_ptr<DeviceKeeper>> Start(const DeviceSettings& settings,
                                                              FrameSource& source, Clock& clock,
-                                                             Log log);
+                                                             Log log, Wake wake = nullptr);
 
   /// Stops the device, within 5 s.
   ~DeviceKeeper();
@@ -57,19 +60,26 @@ class DeviceKeeper {
 
   DeviceState state() const;
 
+  /// Stops a device that discards its frames, until Resume. Returns whether nothing pulls now:
+  /// another device goes on.
+  bool Pause();
+  void Resume();
+
   /// Calls `observer` at once, and whenever its argument may have changed, until it is replaced by
   /// a null observer.
   void Observe(Observer observer);
 
  private:
-  DeviceKeeper(const DeviceSettings& settings, FrameSource& source, Clock& clock, Log log);
+  DeviceKeeper(const DeviceSettings& settings, FrameSource& source, Clock& clock, Log log,
+               Wake wake);
 
   absl::Status Begin();
   void Run();
   void CheckDevice();
-  void PlayOnNull();
+  void PlayOnNull() ABSL_EXCLUSIVE_LOCKS_REQUIRED(change_mutex_);
   void TryWanted();
-  void StopDevice();
+  void PlayOnWanted(std::unique_ptr<AudioDevice> wanted);
+  AudioDevice& device() const;
   void Install(std::unique_ptr<AudioDevice> device, bool wanted);
   void Note(const std::string& message);
   bool plays() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
@@ -80,9 +90,13 @@ class DeviceKeeper {
   FrameSource& source_;
   Clock& clock_;
   const Log log_;
+  const Wake wake_;
   std::chrono::nanoseconds next_try_{0};
+  /// Held while a device is started, stopped or replaced, which takes up to half a second.
+  Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);
+  bool paused_ ABSL_GUARDED_BY(change_mutex_) = false;
   mutable Mutex mutex_;
-  /// Only the keeper's thread changes it.
+  /// Only a thread that holds change_mutex_, too, replaces it.
   std::unique_ptr<AudioDevice> device_ ABSL_GUARDED_BY(mutex_);
   bool wanted_ ABSL_GUARDED_BY(mutex_) = false;  ///< whether device_ is the wanted device
   /// Whether silence is a fault, because a device was named or "auto" has found a device before.

@@ -10,7 +10,10 @@
 namespace carillon {
 namespace {
 
+/// A listener gets its blocks after at most the first of these periods.
 constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
+constexpr std::chrono::milliseconds kUnheardPeriod(20);
+constexpr std::chrono::milliseconds kPausePeriod(100);
 /// Peak and loudness are sampled every kLevelPeriod. The peak is the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kLevelPeriod(50);
 constexpr std::chrono::seconds kPeakMemory(1);
@@ -22,14 +25,16 @@ size_t BlocksPerSecond(const DeviceFormat& format) {
   return format.sample_rate_hz / format.block_frame_count + 1;
 }
 
-MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock) {
+MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock,
+                              std::function<void()> wake) {
   const DeviceFormat& format = settings.format;
   return {.sample_rate_hz = static_cast<double>(format.sample_rate_hz),
           .block_frame_count = format.block_frame_count,
           .channel_count = format.channel_count,
           .clock = &clock,
           .gain = settings.gain,
-          .full_scale_pa = settings.full_scale_pa};
+          .full_scale_pa = settings.full_scale_pa,
+          .wake = std::move(wake)};
 }
 
 }  // namespace
@@ -45,30 +50,38 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
     : settings_(settings),
       clock_(clock),
       log_(std::move(log)),
-      mixer_(MixerSettingsOf(settings, clock)),
+      mixer_(MixerSettingsOf(settings, clock, [this] { Wake(); })),
       broadcast_(settings.format, BlocksPerSecond(settings.format)),
       stems_(mixer_, settings.format, BlocksPerSecond(settings.format)),
       look_ahead_(
           settings.format, settings.look_ahead_block_count,
           [this](std::span<float> block) { RenderBlock(block); }, clock),
       final_fade_(settings.format),
+      needed_at_(clock.Monotonic()),
+      silence_(kBlocksTogether * settings.format.block_size()),
       volume_{.gain = settings.gain},
       loudness_(settings.format.sample_rate_hz, settings.format.channel_count),
       loss_log_(settings.format.sample_rate_hz, log_) {}
 
 LiveOutput::~LiveOutput() {
   stopping_ = true;
+  woken_.release();
   if (housekeeper_.joinable()) housekeeper_.join();
+  {
+    const MutexLock lock(&pause_mutex_);
+    paused_ = false;  // so that the keeper, which may find a device now, does not end the pause
+  }
   keeper_.reset();
   look_ahead_.Stop();
 }
 
 absl::Status LiveOutput::Open() {
   if (absl::Status status = look_ahead_.Start(); !status.ok()) log_(std::string(status.message()));
-  ASSIGN_OR_RETURN(keeper_, DeviceKeeper::Start({.specification = settings_.device,
-                                                 .format = settings_.format,
-                                                 .program = settings_.device_program},
-                                                look_ahead_.source(), clock_, log_));
+  ASSIGN_OR_RETURN(keeper_,
+                   DeviceKeeper::Start({.specification = settings_.device,
+                                        .format = settings_.format,
+                                        .program = settings_.device_program},
+                                       look_ahead_.source(), clock_, log_, [this] { Wake(); }));
   housekeeper_ = std::thread([this] { KeepHouse(); });
   return absl::OkStatus();
 }
@@ -79,6 +92,77 @@ void LiveOutput::RenderBlock(std::span<float> block) {
   mixer_.Render(block);
   final_fade_.Apply(block);
   broadcast_.Publish(first_frame, block);
+}
+
+absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> LiveOutput::Listen(
+    std::optional<BusId> bus, std::function<void()> wake) {
+  auto listener =
+      bus ? stems_.Subscribe(*bus, std::move(wake)) : broadcast_.Subscribe(std::move(wake));
+  Wake();
+  return listener;
+}
+
+bool LiveOutput::paused() const {
+  const MutexLock lock(&pause_mutex_);
+  return paused_;
+}
+
+void LiveOutput::Wake() {
+  {
+    const MutexLock lock(&pause_mutex_);
+    needed_at_ = clock_.Monotonic();
+    if (!paused_) return;
+    Resume();
+  }
+  woken_.release();
+}
+
+bool LiveOutput::KeepPace() {
+  const MutexLock lock(&pause_mutex_);
+  const std::chrono::nanoseconds now = clock_.Monotonic();
+  if (paused_) RenderDueSilence();
+  if (!MayPause()) {
+    needed_at_ = now;
+    if (paused_) Resume();
+  } else if (!paused_ && now - needed_at_ >= settings_.pause_after) {
+    Pause();
+  }
+  return paused_;
+}
+
+bool LiveOutput::MayPause() const {
+  return mixer_.resting() && broadcast_.listener_count() == 0 && !stems_.has_listeners();
+}
+
+void LiveOutput::Pause() {
+  if (!keeper_->Pause()) return;
+  look_ahead_.Stop();
+  paused_ = true;
+  paused_at_ = clock_.Monotonic();
+  paused_frame_ = mixer_.frame();
+}
+
+void LiveOutput::Resume() {
+  RenderDueSilence();
+  paused_ = false;
+  // The ring buffer still holds the silence that was rendered before the pause.
+  look_ahead_.Start().IgnoreError();  // Open has logged a refusal
+  keeper_->Resume();
+}
+
+/// Renders the blocks that the device would have asked for meanwhile. They are silent until an
+/// event comes, which a stream that opens announces before.
+void LiveOutput::RenderDueSilence() {
+  const DeviceFormat& format = settings_.format;
+  const std::chrono::duration<double> elapsed = clock_.Monotonic() - paused_at_;
+  const auto due_count =
+      static_cast<uint64_t>(elapsed.count() * format.sample_rate_hz) / format.block_frame_count;
+  uint64_t block_count = due_count - (mixer_.frame() - paused_frame_) / format.block_frame_count;
+  while (block_count > 0) {
+    const size_t together = std::min<uint64_t>(block_count, kBlocksTogether);
+    mixer_.Render(std::span(silence_).first(together * format.block_size()));
+    block_count -= together;
+  }
 }
 
 OutputState LiveOutput::state() const {
@@ -113,6 +197,7 @@ OutputVolume LiveOutput::ChangeVolume(std::optional<double> gain, std::optional<
 
 void LiveOutput::FadeOut() {
   final_fade_.Begin();
+  if (paused()) return;
   const std::chrono::nanoseconds longest = clock_.Monotonic() + kLongestFade;
   while (!final_fade_.ended() && clock_.Monotonic() < longest) {
     clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
@@ -130,15 +215,21 @@ void LiveOutput::KeepHouse() {
     broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
     stems_.Deliver();
     mixer_.CollectGarbage();
-    if (clock_.Monotonic() >= levels_due) {
+    const std::chrono::nanoseconds now = clock_.Monotonic();
+    if (now >= levels_due) {
       NoteLevels();
-      levels_due += kLevelPeriod;
+      levels_due = std::max(levels_due + kLevelPeriod, now);
     }
-    if (const std::chrono::nanoseconds now = clock_.Monotonic(); now >= losses_due) {
+    if (now >= losses_due) {
       NoteLosses();
       losses_due = now + kLossPeriod;
     }
-    clock_.SleepUntil(clock_.Monotonic() + kHousekeepingPeriod);
+    if (KeepPace()) {
+      woken_.try_acquire_for(kPausePeriod);
+    } else {
+      const bool heard = broadcast_.listener_count() > 0 || stems_.has_listeners();
+      clock_.SleepUntil(clock_.Monotonic() + (heard ? kHousekeepingPeriod : kUnheardPeriod));
+    }
   }
 }
 

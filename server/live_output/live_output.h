@@ -5,11 +5,15 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <semaphore>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
@@ -37,6 +41,9 @@ struct OutputSettings {
   std::string device_program{};
   double gain = 1;                      ///< gain of the output, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
+  /// Time without sound, streams and listeners after which the null device pauses. It is longer
+  /// than the loudness meter's memory.
+  std::chrono::nanoseconds pause_after = std::chrono::seconds(4);
 };
 
 /// The volume of the output.
@@ -63,6 +70,11 @@ struct OutputState {
 /// Renders a mixer ahead of a device that a DeviceKeeper keeps playing, broadcasts the sound to
 /// listeners, and frees retired memory on a housekeeping thread. All functions may be called from
 /// any thread.
+///
+/// On the null device the output pauses once nothing has sounded for a while, no contact stream is
+/// open, and nobody listens: nothing needs the frames then. A stream or a listener ends the pause
+/// at once. The mixer's frames go on with time meanwhile, because the housekeeping thread renders
+/// the silent blocks that are due, many at a time.
 class LiveOutput {
  public:
   /// Takes a line for people to read.
@@ -77,9 +89,15 @@ class LiveOutput {
   LiveOutput& operator=(const LiveOutput&) = delete;
 
   Mixer& mixer() { return mixer_; }
-  BlockBroadcast& broadcast() { return broadcast_; }
-  /// The stems, through which clients listen to single scenes.
-  Stems& stems() { return stems_; }
+
+  /// Adds a listener, to one bus or, without a bus, to the whole sound; see
+  /// BlockBroadcast::Subscribe.
+  absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> Listen(std::optional<BusId> bus,
+                                                                   std::function<void()> wake);
+
+  /// Returns whether rendering pauses.
+  bool paused() const;
+
   const DeviceFormat& format() const { return settings_.format; }
   double full_scale_pa() const { return settings_.full_scale_pa; }
   OutputVolume volume() const;
@@ -101,6 +119,14 @@ class LiveOutput {
 
   absl::Status Open();
   void RenderBlock(std::span<float> block);
+  /// Ends a pause, and lets none begin for a while.
+  void Wake();
+  /// Begins or ends a pause, and renders what is due in it. Returns whether rendering pauses.
+  bool KeepPace();
+  bool MayPause() const;
+  void Pause() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
+  void Resume() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
+  void RenderDueSilence() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
   void KeepHouse();
   void NoteLevels();
   void NoteLosses();
@@ -114,6 +140,16 @@ class LiveOutput {
   LookAhead look_ahead_;
   FinalFade final_fade_;
   std::unique_ptr<DeviceKeeper> keeper_;
+  /// Held while a pause begins, ends, or renders.
+  mutable Mutex pause_mutex_;
+  bool paused_ ABSL_GUARDED_BY(pause_mutex_) = false;
+  /// The newest time at which rendering was needed.
+  std::chrono::nanoseconds needed_at_ ABSL_GUARDED_BY(pause_mutex_){};
+  /// When the pause began, and the mixer's frame then.
+  std::chrono::nanoseconds paused_at_ ABSL_GUARDED_BY(pause_mutex_){};
+  uint64_t paused_frame_ ABSL_GUARDED_BY(pause_mutex_) = 0;
+  std::vector<float> silence_ ABSL_GUARDED_BY(pause_mutex_);
+  std::counting_semaphore<> woken_{0};
   mutable Mutex mutex_;
   OutputVolume volume_ ABSL_GUARDED_BY(mutex_);
   struct Peak {

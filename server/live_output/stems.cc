@@ -24,6 +24,12 @@ void Stems::Deliver() {
   std::erase_if(stems_, [this](const std::unique_ptr<Stem>& stem) { return IsFree(*stem); });
 }
 
+bool Stems::has_listeners() const {
+  const MutexLock lock(&mutex_);
+  return std::ranges::any_of(stems_,
+                             [](const auto& stem) { return stem->broadcast.listener_count() > 0; });
+}
+
 /// Returns whether a stem may be freed, because it has no listener and the mixer has finished the
 /// last block that may use the stem.
 bool Stems::IsFree(Stem& stem) const {

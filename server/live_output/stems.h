@@ -30,6 +30,9 @@ class Stems {
   /// thread calls it periodically.
   void Deliver();
 
+  /// Returns whether anybody listens to any bus.
+  bool has_listeners() const;
+
  private:
   class Stem final : public BusListener {
    public:
@@ -56,7 +59,7 @@ class Stems {
   Mixer& mixer_;
   const DeviceFormat format_;
   const size_t queue_block_count_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   std::vector<std::unique_ptr<Stem>> stems_ ABSL_GUARDED_BY(mutex_);
 };
 

@@ -45,7 +45,8 @@ absl::StatusOr<std::unique_ptr<ContactStream>> ContactStream::Make(
     std::shared_ptr<Scene> scene, Mixer& mixer, const ContactStreamSettings& settings) {
   ASSIGN_OR_RETURN(const double delay_s, SchedulingDelay(settings, mixer));
   ASSIGN_OR_RETURN(std::unique_ptr<EventStream> events,
-                   mixer.OpenStream(kQueueCapacity, !settings.at_once));
+                   mixer.OpenStream(kQueueCapacity,
+                                    settings.at_once ? StreamKind::kAtOnce : StreamKind::kTimely));
   const IntakeSettings intake{.sample_rate_hz = mixer.settings().sample_rate_hz,
                               .step_s = settings.step_s,
                               .delay_s = delay_s,

@@ -62,14 +62,11 @@ absl::Status Scene::CheckFree(uint32_t handle) const {
   return objects_.contains(handle) ? ObjectExists(handle) : absl::OkStatus();
 }
 
-uint32_t Scene::FreeHandle() const {
+std::set<uint32_t> Scene::handles() const {
   const MutexLock lock(&mutex_);
-  uint32_t free = 1;
-  for (const auto& [taken, object] : objects_) {
-    if (taken > free) break;
-    free = taken + 1;
-  }
-  return free;
+  std::set<uint32_t> handles;
+  for (const auto& [handle, object] : objects_) handles.insert(handles.end(), handle);
+  return handles;
 }
 
 absl::Status Scene::Insert(uint32_t handle, SoundingObject object) {

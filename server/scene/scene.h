@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "absl/base/thread_annotations.h"
@@ -85,8 +86,8 @@ class Scene {
   /// handle).
   absl::Status CheckFree(uint32_t handle) const;
 
-  /// Returns the smallest handle above zero that no object has.
-  uint32_t FreeHandle() const;
+  /// Returns the handles of all objects.
+  std::set<uint32_t> handles() const;
 
   /// Inserts an object, and gives it a serial that no object of the scene had before. Errors:
   /// NotFound (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).

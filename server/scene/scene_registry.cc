@@ -196,7 +196,7 @@ absl::Status SceneRegistry::UpdateListener(uint64_t scene, const Pose& pose, dou
 absl::Status SceneRegistry::AwaitRoomForMoves(Scene& scene, size_t count) {
   std::unique_ptr<EventStream>& moves = scene.moves();
   if (moves == nullptr) {
-    ASSIGN_OR_RETURN(moves, mixer_.OpenStream(kMaxObjectCount));
+    ASSIGN_OR_RETURN(moves, mixer_.OpenStream(kMaxObjectCount, StreamKind::kMoves));
   }
   // The mixer takes thousands of events in each block.
   constexpr absl::Duration kLongest = absl::Milliseconds(200), kPause = absl::Microseconds(500);

@@ -28,8 +28,7 @@ absl::Status Alone(const absl::Status& status, size_t) { return status; }
 absl::StatusOr<std::vector<uint32_t>> ChooseHandles(const Scene& scene,
                                                     std::span<const NewObject> objects,
                                                     ElementError at) {
-  std::set<uint32_t> taken;
-  for (const auto& [handle, object] : scene.CopyAll()) taken.insert(handle);
+  std::set<uint32_t> taken = scene.handles();
   for (size_t i = 0; i < objects.size(); ++i) {
     const uint32_t handle = objects[i].handle;
     if (handle == 0 || taken.insert(handle).second) continue;

@@ -50,6 +50,7 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   EndStops();
   pending_.Free(due_);
   RetireLeavingBanks();
+  resting_.store(NothingWaits(), std::memory_order_relaxed);
   NotePeak(frames);
   Count(statistics_.limited_frame_count, limiter_.Apply(frames));
   block_start_ += frame_count;
@@ -151,7 +152,7 @@ void Mixer::Take(MixerEvent& event, EventQueue& queue) noexcept {
   }
   Count(statistics_.shed_count, shed_early ? event.ReportCount() : 0);
   if (event.impulse() == nullptr) return;
-  const bool counts_as_late = late && queue.timely;
+  const bool counts_as_late = late && queue.kind == StreamKind::kTimely;
   Count(counts_as_late ? queue.late_count : queue.accepted_count, event.ReportCount());
   Count(counts_as_late ? statistics_.late_count : statistics_.accepted_count, event.ReportCount());
 }
@@ -305,6 +306,17 @@ void Mixer::SendBack(const Retired& retired) noexcept {
   // There is room for every bank and stream.
   [[maybe_unused]] const bool sent = retired_.TryPush(retired);
   assert(sent);
+}
+
+bool Mixer::NothingWaits() const noexcept {
+  const auto sounds = [this](uint32_t section) ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) {
+    return sections_[section]->counts.sounded;
+  };
+  const auto carries_contacts = [](const EventQueue* queue) {
+    return queue->kind != StreamKind::kMoves;
+  };
+  return pending_.empty() && std::ranges::none_of(open_sections_, sounds) &&
+         std::ranges::none_of(open_queues_, carries_contacts);
 }
 
 void Mixer::NotePeak(std::span<const float> block) noexcept {

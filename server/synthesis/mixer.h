@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -80,6 +81,8 @@ struct MixerSettings {
   /// Threads that render the sections in parallel. If it is null, the caller's thread renders them
   /// all. The sound is the same bit for bit. The threads must outlive the mixer.
   SectionThreads* threads = nullptr;
+  /// Called by OpenStream before it returns, so that whoever pauses rendering begins again.
+  std::function<void()> wake = nullptr;
 };
 
 /// Counts since the mixer was made, and its present state.
@@ -171,16 +174,19 @@ class Mixer {
   /// ended, within 2048 frames. Events already sent to the bank are lost.
   void FadeOut(BankId bank) ABSL_LOCKS_EXCLUDED(kRenderRole);
 
-  /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them. Unless
-  /// it is `timely`, impulses whose frame has passed count as accepted, not as late. Errors:
+  /// Opens a stream of events; `capacity` events may wait in it until the mixer takes them. Errors:
   /// ResourceExhausted (TOO_MANY_STREAMS).
   absl::StatusOr<std::unique_ptr<EventStream>> OpenStream(size_t capacity = 4096,
-                                                          bool timely = true)
+                                                          StreamKind kind = StreamKind::kTimely)
       ABSL_LOCKS_EXCLUDED(kRenderRole);
 
   /// Frees the banks, voices and queues that Render has retired. A housekeeping thread calls it
   /// periodically.
   void CollectGarbage() ABSL_LOCKS_EXCLUDED(kRenderRole);
+
+  /// Returns whether the last call of Render had nothing to do: nothing sounded, no event waits,
+  /// and no contact stream was open.
+  bool resting() const noexcept { return resting_.load(std::memory_order_relaxed); }
 
   /// Number of the next frame to be rendered.
   uint64_t frame() const noexcept { return statistics_.frame_count.load(); }
@@ -290,12 +296,14 @@ class Mixer {
   void EndStops() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RetireLeavingBanks() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void SendBack(const Retired& retired) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool NothingWaits() const noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void NotePeak(std::span<const float> block) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   BankSlot* FindSlot(BankId id) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   const MixerSettings settings_;
   Counters statistics_;
   std::atomic<float> peak_{0};
+  std::atomic<bool> resting_{false};
   std::atomic<float> master_gain_{1};
   const std::vector<std::unique_ptr<Bus>> buses_;
 

@@ -131,16 +131,19 @@ void Mixer::FadeOut(BankId bank) {
   Send({.kind = Command::Kind::kFadeOut, .id = bank});
 }
 
-absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, bool timely) {
-  auto queue = std::make_shared<EventQueue>(capacity, timely);
-  const MutexLock lock(&control_mutex_);
-  if (queues_.size() == settings_.most_streams) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_STREAMS",
-                   absl::StrCat("the mixer serves ", settings_.most_streams,
-                                " contact streams already: close some"));
+absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, StreamKind kind) {
+  auto queue = std::make_shared<EventQueue>(capacity, kind);
+  {
+    const MutexLock lock(&control_mutex_);
+    if (queues_.size() == settings_.most_streams) {
+      return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_STREAMS",
+                     absl::StrCat("the mixer serves ", settings_.most_streams,
+                                  " contact streams already: close some"));
+    }
+    queues_.push_back(queue);
+    Send({.kind = Command::Kind::kAddStream, .queue = queue.get()});
   }
-  queues_.push_back(queue);
-  Send({.kind = Command::Kind::kAddStream, .queue = queue.get()});
+  if (settings_.wake && kind != StreamKind::kMoves) settings_.wake();
   return std::make_unique<EventStream>(std::move(queue));
 }
 

@@ -37,8 +37,7 @@ absl::StatusOr<std::unique_ptr<Listener>> Subscribe(LiveOutput& output,
                                                     std::function<void()> wake) {
   RETURN_IF_ERROR(Check(request));
   RETURN_IF_ERROR(bus.status());
-  if (!*bus) return output.broadcast().Subscribe(std::move(wake));
-  return output.stems().Subscribe(**bus, std::move(wake));
+  return output.Listen(*bus, std::move(wake));
 }
 
 /// Sends the format, then blocks. While a block is being sent, further blocks wait in the

@@ -12,14 +12,21 @@
 
 namespace carillon {
 
+/// What an event stream carries.
+enum class StreamKind {
+  kTimely,  ///< contacts; impulses that come too late are counted as late
+  kAtOnce,  ///< contacts that sound when they come; late impulses count as accepted
+  kMoves,   ///< moves alone, which need not be rendered as long as nothing sounds
+};
+
 /// The part of an event stream that the mixer shares: the pushing thread produces events, the
 /// rendering thread consumes them.
 struct EventQueue {
-  explicit EventQueue(size_t capacity, bool is_timely = true)
-      : events(capacity), timely(is_timely) {}
+  explicit EventQueue(size_t capacity, StreamKind stream_kind = StreamKind::kTimely)
+      : events(capacity), kind(stream_kind) {}
 
   SpscQueue<MixerEvent> events;
-  const bool timely;  ///< if false, late impulses count as accepted
+  const StreamKind kind;
   std::atomic<bool> closed{false};
   std::atomic<uint64_t> accepted_count{0};
   std::atomic<uint64_t> late_count{0};

@@ -47,6 +47,8 @@ class PendingEvents {
   /// number that the caller chooses; tag() returns it.
   bool TryPush(const MixerEvent& event, uint32_t tag = 0, uint32_t owner = 0) noexcept;
 
+  bool empty() const noexcept { return waiting_count_ == 0; }
+
   /// Appends the indices of the events of the block that begins at `block_start`, in order of
   /// arrival. Blocks are collected in ascending order. Collected events stay readable until Free.
   /// Later events of the block's list are collected, too, if `is_stale(event, tag)` says that they
