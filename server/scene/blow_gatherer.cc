@@ -48,91 +48,146 @@ double Share(double time_s, uint32_t handle, uint32_t partner) {
 }  // namespace
 
 BlowGatherer::Events BlowGatherer::Begin(double time_s) {
-  Events events;
+  events_.clear();
   const double since_s = time_s - time_s_.value_or(time_s);
   follows_ = time_s_ && since_s <= kLongestStep * nominal_step_s_;
   if (time_s_ && !follows_) {
     const double missing_count = std::ceil(since_s / nominal_step_s_ - kLongestStep);
-    EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount), events);
+    EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount));
   }
   step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
   previous_time_s_ = std::exchange(time_s_, time_s);
-  return events;
+  return events_;
 }
 
-void BlowGatherer::EndBeforeGap(double missing_count, Events& events) {
+void BlowGatherer::EndBeforeGap(double missing_count) {
   int steps = 0;
   step_s_ = nominal_step_s_;
   for (; steps < std::min<double>(missing_count, kKnotsToEnd) && (!objects_.empty() || gathers());
        ++steps) {
     *time_s_ += step_s_;
-    End(events);
+    EndStep();
   }
   for (; steps < missing_count; ++steps) {
-    for (auto& [bodies, pair] : pairs_) pair.load.Next(0, step_s_);
+    for (Pair& pair : pairs_) pair.load.Next(0, step_s_);
   }
 }
 
 void BlowGatherer::Add(const FeltContact& force, const Roughness& roughness) {
-  for (const Felt& felt : force.all()) Add(felt, 1, roughness);
+  for (const Felt& felt : force.all()) {
+    Add(Part{.handle = felt.handle, .serial = felt.serial, .impulse = felt.impulse()}, 1,
+        roughness);
+  }
 }
 
-void BlowGatherer::Add(const Felt& felt, double per_second, const Roughness& roughness) {
-  const SurfaceImpulse& impulse = felt.impulse();
-  const SurfaceForce force{.at = impulse.at,
-                           .force_newtons = Scaled(impulse.impulse_newton_seconds, per_second)};
-  Object& object = objects_[felt.handle];
-  // The forces on an object that had this handle before have gone with that object.
-  if (object.serial != felt.serial) object = {.serial = felt.serial, .forces = {}};
-  object.forces.push_back({force, roughness});
+void BlowGatherer::Add(const Part& part, double per_second, const Roughness& roughness) {
+  forces_.push_back(
+      {.handle = part.handle,
+       .serial = part.serial,
+       .force = {.at = part.impulse.at,
+                 .force_newtons = Scaled(part.impulse.impulse_newton_seconds, per_second)},
+       .roughness = roughness});
 }
 
 bool BlowGatherer::HasRoom(const ObjectTouch& touch) const {
-  return touch_count_ < kMostTouches &&
-         (pairs_.size() < kMostTouches || pairs_.contains({touch.contact.handle, touch.partner}));
+  if (touches_.size() >= kMostTouches) return false;
+  if (pairs_.size() + new_pairs_.size() < kMostTouches) return true;
+  const Bodies bodies(touch.contact.handle, touch.partner);
+  return new_pairs_.contains(bodies) ||
+         std::ranges::binary_search(pairs_, bodies, {}, &Pair::bodies);
 }
 
 void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
-  ++touch_count_;
-  pairs_[{touch.contact.handle, touch.partner}].touches.push_back(
-      {impulse, touch.roughness, touch.time_offset_s, touch.partner});
+  const Bodies bodies(touch.contact.handle, touch.partner);
+  if (!std::ranges::binary_search(pairs_, bodies, {}, &Pair::bodies)) new_pairs_.insert(bodies);
+  PairTouch& added = touches_.emplace_back();
+  added.bodies = bodies;
+  for (const Felt& felt : impulse.all()) {
+    added.parts[added.part_count++] = {
+        .handle = felt.handle, .serial = felt.serial, .impulse = felt.impulse()};
+  }
+  added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
+  added.roughness = touch.roughness;
+  added.time_offset_s = touch.time_offset_s;
+  added.duration_follows_impulse = impulse.duration_follows_impulse;
 }
 
 BlowGatherer::Events BlowGatherer::End() {
-  Events events;
-  End(events);
-  return events;
+  events_.clear();
+  EndStep();
+  return events_;
 }
 
-void BlowGatherer::End(Events& events) {
-  touch_count_ = 0;
+void BlowGatherer::EndStep() {
+  PairTouches();
   if (follows_) CountPartners();
-  for (auto& [bodies, pair] : pairs_) Divide(bodies, pair, events);
-  std::erase_if(pairs_,
-                [](const auto& pair) { return pair.second.load.idle() && !pair.second.blow; });
-  for (auto& [handle, object] : objects_) {
-    for (const Force& force : object.forces) {
-      events.push_back({handle, object.serial, force.force, *time_s_});
-    }
-    events.push_back({handle, object.serial, MakeKnot(object.forces, step_s_), *time_s_});
-    object.steps_without = object.forces.empty() ? object.steps_without + 1 : 0;
-    object.forces.clear();
+  for (Pair& pair : pairs_) Divide(pair);
+  std::erase_if(pairs_, [](const Pair& pair) { return pair.load.idle() && !pair.blow.begun(); });
+  touches_.clear();
+  SendForces();
+}
+
+void BlowGatherer::PairTouches() {
+  // A client usually reports its contacts in the same order in each step.
+  if (!std::ranges::is_sorted(touches_, {}, &PairTouch::bodies)) {
+    std::ranges::stable_sort(touches_, {}, &PairTouch::bodies);
   }
-  std::erase_if(objects_,
-                [](const auto& object) { return object.second.steps_without >= kKnotsToEnd; });
+  if (!new_pairs_.empty()) {
+    const auto known_count = static_cast<ptrdiff_t>(pairs_.size());
+    for (const Bodies& bodies : new_pairs_) pairs_.push_back({.bodies = bodies});
+    std::ranges::inplace_merge(pairs_, pairs_.begin() + known_count, {}, &Pair::bodies);
+    new_pairs_.clear();
+  }
+  auto first = touches_.begin();
+  for (Pair& pair : pairs_) {
+    const auto last = std::find_if(first, touches_.end(), [&pair](const PairTouch& touch) {
+      return touch.bodies != pair.bodies;
+    });
+    pair.touches = {first, last};
+    first = last;
+  }
+}
+
+void BlowGatherer::SendForces() {
+  std::ranges::stable_sort(forces_, {}, &Force::handle);
+  const auto known_count = static_cast<ptrdiff_t>(objects_.size());
+  for (size_t i = 0; i < forces_.size(); ++i) {
+    const uint32_t handle = forces_[i].handle;
+    const auto known = std::span(objects_).first(static_cast<size_t>(known_count));
+    if (i > 0 && forces_[i - 1].handle == handle) continue;
+    if (std::ranges::binary_search(known, handle, {}, &Object::handle)) continue;
+    objects_.push_back({.handle = handle});
+  }
+  std::ranges::inplace_merge(objects_, objects_.begin() + known_count, {}, &Object::handle);
+  auto first = forces_.begin();
+  for (Object& object : objects_) {
+    const auto last = std::find_if(first, forces_.end(), [&object](const Force& force) {
+      return force.handle != object.handle;
+    });
+    const std::span<const Force> forces(first, last);
+    first = last;
+    // Another object may have got the handle of one that was removed.
+    if (!forces.empty()) object.serial = forces.back().serial;
+    for (const Force& force : forces) {
+      events_.push_back({object.handle, force.serial, force.force, *time_s_});
+    }
+    events_.push_back({object.handle, object.serial, MakeKnot(forces, step_s_), *time_s_});
+    object.steps_without = forces.empty() ? object.steps_without + 1 : 0;
+  }
+  std::erase_if(objects_, [](const Object& object) { return object.steps_without >= kKnotsToEnd; });
+  forces_.clear();
 }
 
 void BlowGatherer::CountPartners() {
-  std::set<uint32_t> changed;
+  std::vector<uint32_t> changed;
   bool stay = false, change_again = false;
   for (auto pair = pairs_.begin(); pair != pairs_.end();) {
-    const uint32_t handle = pair->first.first;
+    const uint32_t handle = pair->bodies.first;
     bool touches = false, touched = false, stays = false;
-    for (; pair != pairs_.end() && pair->first.first == handle; ++pair) {
-      const bool now = std::ranges::any_of(pair->second.touches, [](const PairTouch& touch) {
-        return Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds) > 0;
-      });
-      const bool before = pair->second.touched_s && pair->second.touched_s == previous_time_s_;
+    for (; pair != pairs_.end() && pair->bodies.first == handle; ++pair) {
+      const bool now = std::ranges::any_of(
+          pair->touches, [](const PairTouch& touch) { return touch.magnitude > 0; });
+      const bool before = pair->touched_s && pair->touched_s == previous_time_s_;
       touches = touches || now;
       touched = touched || before;
       stays = stays || (now && before);
@@ -140,8 +195,8 @@ void BlowGatherer::CountPartners() {
     if (!touches || !touched) continue;
     stay = true;
     if (stays) continue;
-    changed.insert(handle);
-    change_again = change_again || changed_.contains(handle);
+    changed.push_back(handle);
+    change_again = change_again || std::ranges::binary_search(changed_, handle);
   }
   stays_in_contact_count_ += stay ? 1 : 0;
   counts_.changed_partner_count += change_again ? 1 : 0;
@@ -159,84 +214,83 @@ BlowCounts BlowGatherer::counts() const {
 }
 
 BlowGatherer::Events BlowGatherer::Finish() {
-  Events events;
-  for (auto& [bodies, pair] : pairs_) {
-    if (pair.blow) SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), 0, events);
+  events_.clear();
+  for (Pair& pair : pairs_) {
+    if (pair.blow.begun()) SendBlow(pair, 0);
   }
-  return events;
+  return events_;
 }
 
 bool BlowGatherer::gathers() const {
-  return std::ranges::any_of(pairs_, [](const auto& pair) { return pair.second.blow.has_value(); });
+  return std::ranges::any_of(pairs_, [](const Pair& pair) { return pair.blow.begun(); });
 }
 
-void BlowGatherer::Divide(const Bodies& bodies, Pair& pair, Events& events) {
+void BlowGatherer::Divide(Pair& pair) {
   double impulse = 0;
-  for (const PairTouch& touch : pair.touches) {
-    impulse += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
-  }
+  for (const PairTouch& touch : pair.touches) impulse += touch.magnitude;
   const double force = impulse / step_s_;
   // The part of the impulse that exceeds the load, 0 to 1.
   double share = pair.load.Next(impulse, step_s_);
-  if (pair.blow) share = force > 0 ? std::max(1 - pair.blow->load_newtons / force, 0.0) : 0;
+  if (pair.blow.begun()) {
+    share = force > 0 ? std::max(1 - pair.blow.load_newtons / force, 0.0) : 0;
+  }
   double remains = 0;
-  if (pair.blow && IsOver(*pair.blow, force, share * impulse, remains)) {
-    SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), remains, events);
+  if (pair.blow.begun() && IsOver(pair.blow, force, share * impulse, remains)) {
+    SendBlow(pair, remains);
     share = 0;
   } else if (share > 0) {
-    if (!pair.blow) pair.blow = BlowOf(pair, (1 - share) * force);
+    if (!pair.blow.begun()) pair.blow.load_newtons = (1 - share) * force;
     Gather(pair, force, share * impulse);
-    if (!follows_) SendBlow(bodies, *std::exchange(pair.blow, std::nullopt), 0, events);
+    if (!follows_) SendBlow(pair, 0);
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
   for (const PairTouch& touch : pair.touches) {
-    for (const Felt& felt : touch.impulse.all()) Add(felt, (1 - share) / step_s_, touch.roughness);
+    for (const Part& part : touch.all()) Add(part, (1 - share) / step_s_, touch.roughness);
   }
   if (force > 0) pair.touched_s = time_s_;
-  pair.touches.clear();
-}
-
-BlowGatherer::Blow BlowGatherer::BlowOf(const Pair& pair, double load_newtons) const {
-  return {.load_newtons = load_newtons,
-          .begin_s = *time_s_,
-          .lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS};
+  pair.touches = {};
 }
 
 void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) const {
-  Blow& blow = *pair.blow;
-  blow.impulses.push_back(impulse);
-  blow.forces.push_back(force_newtons);
-  if (impulse <= blow.greatest) return;
-  blow.greatest = impulse;
-  blow.touches = pair.touches;
+  Blow& blow = pair.blow;
+  if (!blow.begun()) {
+    blow.begin_s = *time_s_;
+    blow.lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS;
+    blow.strongest = 0;
+    blow.touches.clear();
+  }
+  const bool is_strongest = impulse > blow.greatest();
+  blow.steps.push_back({.impulse = impulse, .force = force_newtons});
+  if (!is_strongest) return;
+  blow.strongest = blow.steps.size() - 1;
+  blow.touches.assign(pair.touches.begin(), pair.touches.end());
 }
 
 bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse,
                           double& remains) const {
-  if (impulse <= blow.greatest / 4) return true;
+  if (impulse <= blow.greatest() / 4) return true;
   remains = force_newtons;
   if (*time_s_ - blow.begin_s >= kLongestBlowS) return true;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
-  if (impulse > blow.greatest / 2 || blow.forces.size() < steps + 1) return false;
-  return force_newtons >= 0.75 * *(blow.forces.end() - static_cast<ptrdiff_t>(steps));
+  if (impulse > blow.greatest() / 2 || blow.steps.size() < steps + 1) return false;
+  return force_newtons >= 0.75 * blow.steps[blow.steps.size() - steps].force;
 }
 
-void BlowGatherer::SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons,
-                            Events& events) {
+void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
+  Blow& blow = pair.blow;
   const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
   double impulse = 0;
-  for (const double step : blow.impulses) impulse += std::max(step - excess, 0.0);
+  for (const Blow::Step& step : blow.steps) impulse += std::max(step.impulse - excess, 0.0);
+  blow.steps.clear();
   if (!(impulse > 0)) return;
   ++counts_.blow_count;
   double whole = 0;
-  for (const PairTouch& touch : blow.touches) {
-    whole += Magnitude(touch.impulse.by[0].impulse().impulse_newton_seconds);
-  }
+  for (const PairTouch& touch : blow.touches) whole += touch.magnitude;
   const double scale = impulse / whole;
   for (const PairTouch& touch : blow.touches) {
-    for (size_t i = 0; i < touch.impulse.count; ++i) {
-      events.push_back(PartOfBlow(touch, i, scale));
-      events.back().time_s = TimeOf(bodies, blow, touch);
+    for (size_t i = 0; i < touch.part_count; ++i) {
+      events_.push_back(PartOfBlow(touch, i, scale));
+      events_.back().time_s = TimeOf(pair.bodies, blow, touch);
     }
   }
 }
@@ -248,23 +302,24 @@ double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTo
 
 /// Returns the impulse on the first or the second object of a touch, times `scale`.
 ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
-  const FeltContact& contact = touch.impulse;
-  const double longer = contact.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
-  SurfaceImpulse part = contact.by[which].impulse();
-  part.impulse_newton_seconds = Scaled(part.impulse_newton_seconds, scale);
-  part.pulse = part.pulse.Lasting(static_cast<float>(part.pulse.duration_s() * longer));
-  const bool of_two = contact.count == contact.by.size();
-  return {.handle = contact.by[which].handle,
-          .serial = contact.by[which].serial,
-          .action = part,
-          .by = of_two ? contact.by[1 - which].handle : touch.partner,
+  const double longer = touch.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
+  const Part& part = touch.parts[which];
+  SurfaceImpulse impulse = part.impulse;
+  impulse.impulse_newton_seconds = Scaled(impulse.impulse_newton_seconds, scale);
+  impulse.pulse = impulse.pulse.Lasting(static_cast<float>(impulse.pulse.duration_s() * longer));
+  const bool of_two = touch.part_count == touch.parts.size();
+  return {.handle = part.handle,
+          .serial = part.serial,
+          .action = impulse,
+          .by = of_two ? touch.parts[1 - which].handle : touch.bodies.second,
           .by_sounds = of_two};
 }
 
-ForceKnot BlowGatherer::MakeKnot(const std::vector<Force>& forces, double step_s) {
+ForceKnot BlowGatherer::MakeKnot(std::span<const Force> forces, double step_s) {
   double load = 0, fluctuation = 0, bandwidth = 0;
-  for (const auto& [force, roughness] : forces) {
-    const double share = Magnitude(force.force_newtons);
+  for (const Force& force : forces) {
+    const Roughness& roughness = force.roughness;
+    const double share = Magnitude(force.force.force_newtons);
     const bool travels = roughness.travel_speed_m_per_s > 0;
     load += share;
     fluctuation += travels ? share * roughness.depth : 0;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -66,7 +68,8 @@ struct ForceEvent {
 /// flight, and contacts with a time offset of their own, have exact times.
 class BlowGatherer {
  public:
-  using Events = std::vector<ForceEvent>;
+  /// Events, valid until the next call of a function that returns events.
+  using Events = std::span<const ForceEvent>;
 
   /// `step_s` is the simulator's step, seconds.
   explicit BlowGatherer(double step_s) : nominal_step_s_(step_s) {}
@@ -80,7 +83,7 @@ class BlowGatherer {
   void Add(const FeltContact& force, const Roughness& roughness);
 
   /// The greatest number of contacts of a step, and of pairs of bodies whose contacts are followed.
-  /// A pair and its contact take about 900 bytes.
+  /// A pair and its contact take about 700 bytes.
   static constexpr size_t kMostTouches = 16'384;
 
   /// Returns whether Touch may be called with this contact.
@@ -99,73 +102,103 @@ class BlowGatherer {
   BlowCounts counts() const;
 
  private:
+  using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
+
+  /// The force on an object in this step.
   struct Force {
+    uint32_t handle = 0;
+    uint64_t serial = 0;
     SurfaceForce force;
     Roughness roughness;
   };
+  /// An object under a force in this step or shortly before.
   struct Object {
+    uint32_t handle = 0;
     uint64_t serial = 0;
-    std::vector<Force> forces;  // of this step
     int steps_without = 0;
   };
+  /// The impulse of a contact on one of its objects.
+  struct Part {
+    uint32_t handle = 0;
+    uint64_t serial = 0;
+    SurfaceImpulse impulse;
+  };
   struct PairTouch {
-    FeltContact impulse;
+    Bodies bodies;
+    std::array<Part, 2> parts{};
+    size_t part_count = 0;
+    double magnitude = 0;  // of the first object's impulse, N s
     Roughness roughness;
     double time_offset_s = 0;
-    uint32_t partner = 0;
+    bool duration_follows_impulse = false;
+
+    std::span<const Part> all() const { return std::span(parts).first(part_count); }
   };
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, double scale);
-  /// The steps of a blow that is not over yet.
+  /// The steps of a blow that is not over yet, or none.
   struct Blow {
+    struct Step {
+      double impulse = 0;  // above the load, N s
+      double force = 0;    // the whole force, newtons
+    };
     double load_newtons = 0;  // load before the blow
     double begin_s = 0;
-    std::vector<double> impulses{};    // impulse of each step above the load, N s
-    std::vector<double> forces{};      // whole force of each step, newtons
-    std::vector<PairTouch> touches{};  // touches of the step with the greatest impulse
-    double greatest = 0;               // the greatest of `impulses`
+    std::vector<Step> steps{};
+    size_t strongest = 0;              // index of the step with the greatest impulse
+    std::vector<PairTouch> touches{};  // touches of that step
     bool lasting = false;              // whether the bodies touched shortly before the blow
+
+    bool begun() const { return !steps.empty(); }
+    double greatest() const { return steps.empty() ? 0 : steps[strongest].impulse; }
   };
   struct Pair {
-    LoadTracker load;
-    std::vector<PairTouch> touches;   // of this step
-    std::optional<double> touched_s;  // the time of the last touch before this step
-    std::optional<Blow> blow;
+    Bodies bodies;
+    LoadTracker load{};
+    std::span<const PairTouch> touches{};            // of this step, in touches_
+    std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
+    Blow blow{};
   };
-  using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
 
-  void End(Events& events);
+  void EndStep();
+  /// Makes the pairs that touch for the first time, and gives each pair its touches of this step.
+  void PairTouches();
   /// Counts this step if objects stay in contact in it, and if some of them keep no partner again.
   void CountPartners();
   /// Ends the forces, and lets `missing_count` steps without contact pass.
-  void EndBeforeGap(double missing_count, Events& events);
-  /// Adds a force to this step: the impulse of `felt`, N s, times `per_second`, 1/s.
-  void Add(const Felt& felt, double per_second, const Roughness& roughness);
+  void EndBeforeGap(double missing_count);
+  /// Adds a force to this step: the impulse of `part`, N s, times `per_second`, 1/s.
+  void Add(const Part& part, double per_second, const Roughness& roughness);
+  /// Sends the forces of this step, and each object's knot.
+  void SendForces();
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
-  void Divide(const Bodies& bodies, Pair& pair, Events& events);
-  /// Returns the blow that begins in this step; its impulses are still empty.
-  Blow BlowOf(const Pair& pair, double load_newtons) const;
-  /// Adds a step's force and the impulse above the load to the pair's blow.
+  void Divide(Pair& pair);
+  /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
+  /// first step.
   void Gather(Pair& pair, double force_newtons, double impulse) const;
   /// Returns whether the blow is over in this step, which has the given force and impulse above the
   /// load. If a load remains, `remains` is set to its force.
   bool IsOver(const Blow& blow, double force_newtons, double impulse, double& remains) const;
-  void SendBlow(const Bodies& bodies, const Blow& blow, double remains_newtons, Events& events);
+  /// Sends a pair's blow, and ends it.
+  void SendBlow(Pair& pair, double remains_newtons);
   /// Returns the time of a touch of a blow that is over in this step.
   double TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const;
   bool gathers() const;
-  static ForceKnot MakeKnot(const std::vector<Force>& forces, double step_s);
+  static ForceKnot MakeKnot(std::span<const Force> forces, double step_s);
 
   double nominal_step_s_;
   double step_s_ = 0;  // time since the previous step
   std::optional<double> time_s_;
   std::optional<double> previous_time_s_;
-  std::map<uint32_t, Object> objects_;
-  std::map<Bodies, Pair> pairs_;
-  size_t touch_count_ = 0;               // number of contacts in this step
+  std::vector<Force> forces_;            // of this step
+  std::vector<Object> objects_;          // ascending by handle
+  std::vector<PairTouch> touches_;       // of this step
+  std::vector<Pair> pairs_;              // ascending by bodies
+  std::set<Bodies> new_pairs_;           // pairs of this step that are not in pairs_ yet
+  std::vector<ForceEvent> events_;       // those of the last call
   bool follows_ = false;                 // whether no step is missing before this step
   BlowCounts counts_;                    // changed_partner_count without its conditions
   uint64_t stays_in_contact_count_ = 0;  // steps with an object that touched in the step before
-  std::set<uint32_t> changed_;           // objects that kept no partner in the last step
+  std::vector<uint32_t> changed_;        // ascending; objects that kept no partner in the last step
 };
 
 }  // namespace carillon

@@ -20,9 +20,6 @@
 namespace carillon {
 namespace {
 
-/// Change of an object's speed, m/s, beyond which an impulse is probably a mistake.
-constexpr double kFastSpeed = 100;
-
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
@@ -46,7 +43,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       mapper_(settings.sample_rate_hz,
               settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
       time_s_(mapper_.mapping().first_time_s),
-      intervals_(settings.step_s),
+      diagnostics_(settings.step_s, settings.rejections),
       gatherer_(settings.step_s),
       pose_times_(settings.step_s) {}
 
@@ -70,9 +67,7 @@ absl::Status ContactIntake::BeginStep(double time_s) {
     mapper_.Note(time_s, target_.frame());
   }
   Push(gatherer_.Begin(time_s));
-  if (step_count_ > 0) intervals_.Add(time_s - time_s_);
-  stands_ = step_count_ > 0 && time_s == time_s_;
-  has_force_ = false;
+  diagnostics_.BeginStep(time_s);
   time_s_ = time_s;
   ++step_count_;
   return absl::OkStatus();
@@ -94,8 +89,8 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
     return TryAdd(impulse, *struck);
   }
   FeltContact felt;
-  RETURN_IF_ERROR(Locate(impulse.contact, 1, felt));
-  NoteZero(impulse.contact);
+  RETURN_IF_ERROR(Locate(impulse.contact, PointSource::kClient, 1, felt));
+  diagnostics_.NoteZero(impulse.contact);
   for (size_t i = 0; i < felt.count; ++i) {
     BlowRecord blow;
     blow.handle = felt.by[i].handle;
@@ -110,8 +105,8 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
 absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::Struck& struck) {
   const Vector3& added = impulse.contact.impulse.impulse_newton_seconds;
   RETURN_IF_ERROR(Validate(impulse.contact.impulse));
-  RETURN_IF_ERROR(Examine(std::span(&struck.felt, 1), added, 1));
-  NoteZero(impulse.contact);
+  RETURN_IF_ERROR(diagnostics_.Examine(std::span(&struck.felt, 1), added, 1));
+  diagnostics_.NoteZero(impulse.contact);
   struck.Add(added);
   if (settings_.blows == nullptr) return absl::OkStatus();
   MixerEvent alone = struck.felt.event;
@@ -125,7 +120,7 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
 }
 
 void ContactIntake::Hold(std::span<const ObjectForce> forces) {
-  NoteForce();
+  diagnostics_.NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectForce& force : forces) {
     Note(force.contact, TryHold(force));
@@ -136,13 +131,13 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
   RETURN_IF_ERROR(Validate(force.roughness));
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   FeltContact felt;
-  RETURN_IF_ERROR(Locate(force.contact, settings_.step_s, felt));
+  RETURN_IF_ERROR(Locate(force.contact, PointSource::kClient, settings_.step_s, felt));
   gatherer_.Add(felt, force.roughness);
   return absl::OkStatus();
 }
 
 void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
-  NoteForce();
+  diagnostics_.NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectTouch& touch : touches) {
     Note(touch.contact, TryTouch(touch));
@@ -159,10 +154,8 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
                                 "fewer points, and give a body the same partner in each step"));
   }
   FeltContact felt;
-  ObjectContact contact = touch.contact;
-  contact.found_by_engine = true;
-  RETURN_IF_ERROR(Locate(contact, 1, felt));
-  NoteZero(contact);
+  RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, felt));
+  diagnostics_.NoteZero(touch.contact);
   gatherer_.Touch(touch, felt);
   return absl::OkStatus();
 }
@@ -209,72 +202,28 @@ void ContactIntake::Finish() {
   Push(gatherer_.Finish());
 }
 
-void ContactIntake::Reject(uint64_t count, absl::Status reason) {
-  rejected_count_ += count;
-  if (settings_.rejections != nullptr) settings_.rejections->Add(count, reason);
-  last_rejection_ = std::move(reason);
-  last_rejected_time_s_ = time_s_;
-}
-
-absl::Status ContactIntake::last_rejection() const {
-  return last_rejection_.ok() || step_count_ <= 1 ? last_rejection_
-                                                  : AtTime(last_rejection_, last_rejected_time_s_);
-}
-
 void ContactIntake::Note(uint64_t count, const ReportPlace& place, const absl::Status& verdict) {
   if (verdict.ok()) return;
   Reject(count, place.list == nullptr ? verdict : AtElement(verdict, place.list, place.index));
 }
 
-absl::Status ContactIntake::Locate(const ObjectContact& contact, double seconds,
+absl::Status ContactIntake::Locate(const ObjectContact& contact, PointSource source, double seconds,
                                    FeltContact& felt) {
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Find(contact.handle));
   const SoundingObject* second = nullptr;
   if (contact.second) {
     ASSIGN_OR_RETURN(second, scene_.Find(contact.second->handle));
   }
-  RETURN_IF_ERROR(settings_.reading.scene_frame
-                      ? Feel(FromSceneFrame(contact, *object, second), *object, second, felt)
-                      : Feel(contact, *object, second, felt));
+  RETURN_IF_ERROR(settings_.reading.scene_frame ? Feel(FromSceneFrame(contact, *object, second),
+                                                       source, *object, second, felt)
+                                                : Feel(contact, source, *object, second, felt));
   if (settings_.reading.gaussian_pulses) {
     for (Felt& one : felt.all()) {
       auto& impulse = std::get<SurfaceImpulse>(one.event.action);
       impulse.pulse = Pulse::Gaussian(impulse.pulse.duration_s());
     }
   }
-  return Examine(felt.all(), contact.impulse.impulse_newton_seconds, seconds);
-}
-
-absl::Status ContactIntake::Examine(std::span<const Felt> felt, const Vector3& vector,
-                                    double seconds) {
-  constexpr double kDistantShare = 0.05;
-  const auto& [x, y, z] = vector;
-  // No less than the length, and far quicker.
-  const double bound = (std::abs(x) + std::abs(y) + std::abs(z)) * seconds;
-  for (const Felt& one : felt) {
-    findings_.largest_distance_m = std::max(findings_.largest_distance_m, one.distance_m);
-    if (one.distance_m > kDistantShare * one.extent_m) ++findings_.distant_point_count;
-    const double noted_speed = std::min(kFastSpeed, findings_.largest_speed_change_m_per_s);
-    if (bound <= noted_speed * one.mass_kg) continue;
-    const double impulse = std::hypot(x, y, z) * seconds;
-    if (impulse <= one.largest_newton_seconds) {
-      NoteSpeedChange(impulse / one.mass_kg);
-      continue;
-    }
-    ++findings_.too_large_impulse_count;
-    return Invalid("IMPULSE_TOO_LARGE",
-                   absl::StrCat("an impulse of ", impulse, " N s on object ", one.handle,
-                                ": it may be at most ", one.largest_newton_seconds,
-                                ", ten times the object's mass times the speed of sound in its "
-                                "material; send newton seconds, and check the object's size"));
-  }
-  return absl::OkStatus();
-}
-
-void ContactIntake::NoteSpeedChange(double speed_m_per_s) {
-  findings_.largest_speed_change_m_per_s =
-      std::max(findings_.largest_speed_change_m_per_s, speed_m_per_s);
-  if (speed_m_per_s > kFastSpeed) ++findings_.fast_impulse_count;
+  return diagnostics_.Examine(felt.all(), contact.impulse.impulse_newton_seconds, seconds);
 }
 
 double ContactIntake::AheadS(double frame) const {
@@ -285,29 +234,6 @@ double ContactIntake::ahead_s() const {
   if (step_count_ == 0) return 0;
   const double frame = FrameOf(time_s_);
   return CheckAhead(frame).ok() ? AheadS(frame) : 0;
-}
-
-void ContactIntake::NoteZero(const ObjectContact& contact) {
-  const auto& [x, y, z] = contact.impulse.impulse_newton_seconds;
-  if (x == 0 && y == 0 && z == 0) ++findings_.zero_impulse_count;
-}
-
-void ContactIntake::NoteForce() {
-  if (std::exchange(has_force_, true)) return;
-  ++force_step_count_;
-  findings_.standing_step_count += stands_ ? 1 : 0;
-}
-
-IntakeFindings ContactIntake::findings() const {
-  constexpr uint64_t kManyStanding = 10, kStandingPart = 5;
-  IntakeFindings findings = findings_;
-  if (findings.standing_step_count < kManyStanding ||
-      kStandingPart * findings.standing_step_count < force_step_count_) {
-    findings.standing_step_count = 0;
-  }
-  findings.engine = gatherer_.counts();
-  findings.regular_gap_s = intervals_.RegularGapS();
-  return findings;
 }
 
 void ContactIntake::PushStruck() {

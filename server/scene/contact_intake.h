@@ -5,19 +5,20 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/scene/blow_gatherer.h"
 #include "server/scene/blow_record.h"
+#include "server/scene/diagnostics.h"
 #include "server/scene/due_frame.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
 #include "server/scene/step_impulses.h"
-#include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -60,21 +61,6 @@ struct IntakeSettings {
   RejectionCounts* rejections = nullptr;
   /// If not null, gets each impulse that is handed on. It must outlive the intake.
   std::vector<BlowRecord>* blows = nullptr;
-};
-
-/// The numbers of unusual contacts that a ContactIntake has found so far in a simulation.
-struct IntakeFindings {
-  BlowCounts engine{};
-  uint64_t distant_point_count = 0;      ///< points farther from the surface than 5 % of the extent
-  double largest_distance_m = 0;         ///< largest distance of a point from its object's surface
-  uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
-  uint64_t too_large_impulse_count = 0;  ///< contacts rejected for their impulse
-  double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
-  uint64_t fast_impulse_count = 0;       ///< impulses that change a speed by over 100 m/s
-  double largest_speed_change_m_per_s = 0;
-  /// Steps with touches or forces at the time of the step before. Zero unless there are at least
-  /// ten, a fifth of all steps with touches or forces.
-  uint64_t standing_step_count = 0;
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -122,7 +108,9 @@ class ContactIntake {
   void Finish();
 
   /// Counts `count` contacts that could not be used. Other rejections name the report's place.
-  void Reject(uint64_t count, absl::Status reason);
+  void Reject(uint64_t count, absl::Status reason) {
+    diagnostics_.Reject(count, std::move(reason));
+  }
 
   const TimeMapping& mapping() const { return mapper_.mapping(); }
   /// Number of times that simulation time was mapped anew.
@@ -133,11 +121,10 @@ class ContactIntake {
   double ahead_s() const;
   /// Number of impulses handed on.
   uint64_t impulse_count() const { return impulse_count_; }
-  uint64_t rejected_count() const { return rejected_count_; }
-  /// Returns the reason of the newest rejection, with the time of its step if there are several, or
-  /// OK if no contact was rejected.
-  absl::Status last_rejection() const;
-  IntakeFindings findings() const;
+  uint64_t rejected_count() const { return diagnostics_.rejected_count(); }
+  /// See Diagnostics::last_rejection.
+  absl::Status last_rejection() const { return diagnostics_.last_rejection(); }
+  IntakeFindings findings() const { return diagnostics_.findings(gatherer_.counts()); }
 
  private:
   absl::Status TryStrike(const ObjectImpulse& impulse)
@@ -155,15 +142,8 @@ class ContactIntake {
   }
   /// Finds the objects of a contact and the impulses that they feel. `seconds` is one for an
   /// impulse, and the step for a force.
-  absl::Status Locate(const ObjectContact& contact, double seconds, FeltContact& felt)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
-  void NoteSpeedChange(double speed_m_per_s);
-  /// Counts unusual properties of a contact. `vector` is its impulse, or a force that lasts for
-  /// `seconds`. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
-  absl::Status Examine(std::span<const Felt> felt, const Vector3& vector, double seconds);
-  void NoteZero(const ObjectContact& contact);
-  /// Counts the step of a touch or a force.
-  void NoteForce();
+  absl::Status Locate(const ObjectContact& contact, PointSource source, double seconds,
+                      FeltContact& felt) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   /// Hands on the impulses of the step so far. Those on an object that was removed meanwhile are
   /// rejected.
   void PushStruck();
@@ -188,19 +168,12 @@ class ContactIntake {
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
-  bool stands_ = false;     // whether this step has the time of the last one
-  bool has_force_ = false;  // whether this step has a touch or a force
-  uint64_t force_step_count_ = 0;
-  StepIntervals intervals_;
+  Diagnostics diagnostics_;
   StepImpulses struck_;
   BlowGatherer gatherer_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;
   uint64_t impulse_count_ = 0;
-  uint64_t rejected_count_ = 0;
-  absl::Status last_rejection_;
-  double last_rejected_time_s_ = 0;
-  IntakeFindings findings_;
 };
 
 }  // namespace carillon

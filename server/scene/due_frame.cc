@@ -3,15 +3,11 @@
 
 #include <cmath>
 
-#include "server/scene/offline_renderer.h"
-
 namespace carillon {
 namespace {
 
 /// Fewest late steps in a row that show that the following steps will be late, too.
 constexpr uint64_t kFewestLateSteps = 3;
-/// A recorded trace begins at a multiple of this number of frames.
-constexpr uint64_t kGrainFrames = OfflineRenderer::kBlockFrameCount;
 
 }  // namespace
 
@@ -34,8 +30,8 @@ void TimeMapper::Note(double time_s, uint64_t frame) {
   const auto run_frames = static_cast<double>(frame - *since_frame_);
   if (step_count_ < kFewestLateSteps || run_frames < kLateRunS * sample_rate_hz_) return;
   const double grains =
-      std::ceil((late_frames + mapping_.delay_s * sample_rate_hz_) / double{kGrainFrames});
-  mapping_.first_frame += static_cast<uint64_t>(grains) * kGrainFrames;
+      std::ceil((late_frames + mapping_.delay_s * sample_rate_hz_) / double{kOfflineBlockFrames});
+  mapping_.first_frame += static_cast<uint64_t>(grains) * kOfflineBlockFrames;
   since_frame_.reset();
   ++remap_count_;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -18,6 +19,10 @@ struct TimeMapping {
     return static_cast<double>(first_frame) + (time_s - first_time_s + delay_s) * sample_rate_hz;
   }
 };
+
+/// Number of frames in a block of an offline rendering. A recorded trace begins at a multiple of
+/// this number.
+inline constexpr size_t kOfflineBlockFrames = 128;
 
 /// The time for which every step must come late before simulation time is mapped anew. After a
 /// shorter pause of the network, the delayed steps come together, and the following steps are in

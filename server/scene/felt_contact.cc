@@ -106,7 +106,7 @@ Vector3 OppositeImpulse(const ObjectContact& contact, const SoundingObject& obje
 
 }  // namespace
 
-absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,
+absl::Status Feel(const ObjectContact& contact, PointSource source, const SoundingObject& object,
                   const SoundingObject* second, FeltContact& felt) {
   const ContactImpulse& impulse = contact.impulse;
   if (second != nullptr && contact.second->rotation) {
@@ -114,7 +114,8 @@ absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,
   }
   RETURN_IF_ERROR(Validate(impulse));
   const auto locate = [&](const SoundingObject& of, const auto& location, const Vector3& felt_by) {
-    return contact.found_by_engine ? LocateEngines(of, location, felt_by) : Locate(of, location);
+    return source == PointSource::kEngine ? LocateEngines(of, location, felt_by)
+                                          : Locate(of, location);
   };
   ASSIGN_OR_RETURN(const LocatedPoint& located,
                    locate(object, impulse.location, impulse.impulse_newton_seconds));

@@ -45,12 +45,18 @@ struct FeltContact {
 /// The duration of an elastic collision is proportional to the impulse to this power.
 inline constexpr double kDurationPower = -0.2;
 
+/// Who found the points of a contact.
+enum class PointSource {
+  kClient,
+  kEngine,  ///< points may lie inside the bodies, because engines let bodies overlap
+};
+
 /// Fills in the impulses that `contact` gives to `object` and, in a contact of two objects, to
 /// `second`. Points are in metres of the object at its size. If the contact states no duration, the
 /// duration is that of the collision of `object` with `second` or, if that is null, with the tip of
 /// a steel hammer. Errors: InvalidArgument (INVALID_POSE: the rotation between the objects, and
 /// those of Validate and of SurfaceLocator).
-absl::Status Feel(const ObjectContact& contact, const SoundingObject& object,
+absl::Status Feel(const ObjectContact& contact, PointSource source, const SoundingObject& object,
                   const SoundingObject* second, FeltContact& felt);
 
 }  // namespace carillon

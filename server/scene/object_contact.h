@@ -30,8 +30,6 @@ struct ObjectContact {
   uint32_t handle = 0;
   ContactImpulse impulse{};
   std::optional<SecondObject> second = std::nullopt;
-  /// Whether points may lie inside the bodies, because engines let bodies overlap.
-  bool found_by_engine = false;
   ReportPlace place{};
 
   uint64_t object_count() const { return second ? 2 : 1; }

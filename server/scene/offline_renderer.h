@@ -66,7 +66,7 @@ struct OfflineSummary {
 class OfflineRenderer {
  public:
   /// Number of frames in a block that Render makes.
-  static constexpr size_t kBlockFrameCount = 128;
+  static constexpr size_t kBlockFrameCount = kOfflineBlockFrames;
   /// Impulses later than this after the first time of the mapping, seconds, are rejected.
   static constexpr double kMaxDurationS = 86400;
 

@@ -129,7 +129,7 @@ TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBoth
     const SoundingObject object = scenes_.UpdateObject(scene_, first, {})->object;
     const SoundingObject other = scenes_.UpdateObject(scene_, second, {})->object;
     FeltContact felt;
-    EXPECT_TRUE(Feel(contact, object, &other, felt).ok());
+    EXPECT_TRUE(Feel(contact, PointSource::kClient, object, &other, felt).ok());
     return felt;
   };
   const FeltContact hard = feel(1, 2), mixed = feel(1, 3), reversed = feel(3, 1);

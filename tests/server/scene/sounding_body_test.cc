@@ -46,7 +46,7 @@ TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
   // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
   contact.impulse.location = Point{0, 0.15, 0};
   FeltContact felt;
-  ASSERT_TRUE(Feel(contact, placed.object, nullptr, felt).ok());
+  ASSERT_TRUE(Feel(contact, PointSource::kClient, placed.object, nullptr, felt).ok());
   const TrianglePoint& at = felt.by[0].impulse().at;
   for (size_t corner = 0; corner < 3; ++corner) {
     const uint32_t vertex = at.vertices[corner];
