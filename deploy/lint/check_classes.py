@@ -14,8 +14,7 @@ MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?
 APART = {
     "server/decomposition/job_cancellation.cc", "server/mode_database/model_collection.cc",
     "server/scene/scene_registry_objects.cc", "server/synthesis/bank/oscillator_bank_setup.cc",
-    "server/synthesis/bank/oscillator_bank_strikes.cc", "server/synthesis/mixer_buses.cc",
-    "server/synthesis/mixer_control.cc", "server/synthesis/mixer_overload.cc",
+    "server/synthesis/bank/oscillator_bank_strikes.cc",
     "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
     "client_sdk/cpp/internal/grpc_client_runs.cc", "client_sdk/cpp/internal/grpc_client_streams.cc",
 }

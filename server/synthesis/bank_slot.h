@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "server/synthesis/bank/oscillator_bank.h"
+#include "server/synthesis/schedule/mixer_event.h"
 #include "server/synthesis/voice/voice.h"
 
 namespace carillon {
@@ -23,6 +27,25 @@ struct BankSlot {
   bool fading = false;
   bool awakening = false;  ///< its awakening_work is counted already in the present block
   float fade_gain = 1;
+};
+
+/// The slots of all banks of a mixer. Its size is fixed.
+class BankTable {
+ public:
+  explicit BankTable(size_t slot_count) : slots_(slot_count) {}
+
+  std::span<BankSlot> slots() noexcept { return slots_; }
+  BankSlot& operator[](size_t index) noexcept { return slots_[index]; }
+
+  /// Returns the slot of a bank, or null if the bank is not on the mixer.
+  BankSlot* Find(BankId id) noexcept {
+    if (id.slot >= slots_.size()) return nullptr;
+    BankSlot& slot = slots_[id.slot];
+    return slot.bank != nullptr && slot.generation == id.generation ? &slot : nullptr;
+  }
+
+ private:
+  std::vector<BankSlot> slots_;
 };
 
 }  // namespace carillon

@@ -20,6 +20,12 @@ struct BusId {
   friend bool operator==(const BusId&, const BusId&) = default;
 };
 
+/// The sound of a bus at this moment, in figures.
+struct BusState {
+  uint64_t active_mode_count = 0;  ///< modes that ring
+  float peak = 0;                  ///< the largest sample of late; it falls by 40 dB a second
+};
+
 /// Receives the sound of one bus.
 class BusListener {
  public:

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cmath>
+#include <memory>
+#include <optional>
+#include <semaphore>
+#include <string>
 #include <thread>
 
 #include "server/scene/scene_registry.h"
@@ -23,7 +26,8 @@ class PausingOutputTest : public testing::Test {
     while (!output_->paused()) std::this_thread::yield();
   }
 
-  /// Returns the frame that the machine's clock says is due, counted from the first call.
+  /// Returns the frame that is due by the machine's clock, counted from the first call. Frames that
+  /// a busy machine did not render in time are lost.
   double DueFrame() {
     const nanoseconds now = clock_.Monotonic();
     if (begin_ == nanoseconds::zero()) {
@@ -31,7 +35,8 @@ class PausingOutputTest : public testing::Test {
       first_frame_ = output_->mixer().frame();
     }
     const std::chrono::duration<double> elapsed = now - begin_;
-    return static_cast<double>(first_frame_) + elapsed.count() * output_->format().sample_rate_hz;
+    return static_cast<double>(first_frame_) + elapsed.count() * output_->format().sample_rate_hz -
+           static_cast<double>(output_->state().lost_frame_count);
   }
 
   SystemClock clock_;
@@ -53,9 +58,10 @@ TEST_F(PausingOutputTest, TheFramesGoOnWithTimeThroughPausesAndAStreamFindsThePr
     EXPECT_FALSE(output_->paused());
     const double due = DueFrame();
     const auto frame = static_cast<double>(output_->mixer().frame());
-    // Each pause rounds to blocks twice. A busy machine delays the look at the clock by up to 20
-    // ms.
-    EXPECT_NEAR(frame, due, (2 * pause + 3) * block + 0.02 * 48000) << pause;
+    // The ring buffer may be empty, and each pause begins and ends between two blocks.
+    const double tolerance = (8 + 2 * (pause + 1)) * block;
+    EXPECT_GE(frame, due - tolerance) << pause;
+    EXPECT_LE(frame, DueFrame() + tolerance) << pause;
   }
 }
 
@@ -63,16 +69,21 @@ TEST_F(PausingOutputTest, AContactAfterAPauseSoundsInTime) {
   SceneRegistry scenes(output_->mixer());
   const uint64_t scene = *scenes.CreateScene();
   const uint32_t handle = scenes.AddObject(scene, 0, SmallModel(), SmallProperties())->handle;
-  AwaitPause();
-  const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01});
-  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
-  stream->intake().Strike(SmallImpulse(handle));
-  stream->intake().EndStep();
-  while (!stream->settled()) std::this_thread::yield();
-  EXPECT_EQ(stream->counts().accepted_count, 1U);
-  EXPECT_EQ(stream->counts().late_count, 0U);
-  while (output_->state().peak == 0) std::this_thread::yield();
-  EXPECT_FALSE(output_->paused());
+  for (bool in_time = false; !in_time;) {
+    AwaitPause();
+    const nanoseconds begin = clock_.Monotonic();
+    const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01});
+    ASSERT_TRUE(stream->intake().BeginStep(0).ok());
+    stream->intake().Strike(SmallImpulse(handle));
+    stream->intake().EndStep();
+    in_time = clock_.Monotonic() - begin < milliseconds(10);  // else the machine is too busy
+    while (!stream->settled()) std::this_thread::yield();
+    EXPECT_EQ(stream->counts().accepted_count + stream->counts().late_count, 1U);
+    if (in_time) {
+      EXPECT_EQ(stream->counts().late_count, 0U);
+    }
+    while (output_->state().peak == 0) std::this_thread::yield();
+  }
 }
 
 TEST_F(PausingOutputTest, AListenerEndsAPauseAndHearsEveryBlock) {
