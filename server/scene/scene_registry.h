@@ -16,25 +16,12 @@
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
 #include "server/scene/contact_stream.h"
+#include "server/scene/object_maker.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_volumes.h"
-#include "server/scene/sounding_body.h"
 
 namespace carillon {
-
-/// An object, and the handle by which contacts name the object.
-struct PlacedObject {
-  uint32_t handle = 0;
-  SoundingObject object;
-};
-
-/// An object to be made.
-struct NewObject {
-  uint32_t handle = 0;  ///< zero stands for any free handle
-  std::shared_ptr<const ModalModel> model;
-  ObjectProperties properties;
-};
 
 /// A change of an object. Absent properties stay as they are.
 struct ObjectChange {
@@ -56,7 +43,7 @@ class SceneRegistry {
 
   /// `mixer` and `transfers` must outlive the registry. `transfers` is null if none are stored.
   explicit SceneRegistry(Mixer& mixer, TransferStore* transfers = nullptr)
-      : mixer_(mixer), transfers_(transfers), volumes_(mixer) {}
+      : mixer_(mixer), maker_(mixer, transfers), volumes_(mixer) {}
 
   /// Makes a scene and returns its number. `id` is the id within the scene's name; if it is empty,
   /// the number is the id. Errors: ResourceExhausted (TOO_MANY_SCENES), AlreadyExists
@@ -178,7 +165,6 @@ class SceneRegistry {
                                                         std::span<const NewObject> objects,
                                                         ElementError at,
                                                         absl::FunctionRef<bool()> goes_on);
-  absl::StatusOr<SoundingObject> MakeObject(const Scene& scene, const NewObject& object);
   void FadeOut(std::span<const PlacedObject> objects);
   /// Puts the objects that were `made` into the scene, and sets their handles. Errors: NotFound
   /// (SCENE_NOT_FOUND), AlreadyExists (OBJECT_EXISTS).
@@ -187,8 +173,6 @@ class SceneRegistry {
   /// Moves the listener of objects that were made for a listener at `listener` to where the
   /// scene's listener is now.
   void CatchUp(Scene& scene, std::span<const PlacedObject> placed, const Pose& listener);
-  absl::StatusOr<SoundingObject> Remake(const SoundingObject& old,
-                                        const ObjectProperties& properties);
   /// Makes `old`, a copy of an object of the scene, anew with the transfer that fits it best.
   void TakeOverTransfer(Scene& scene, uint32_t handle, const SoundingObject& old);
   /// Waits until this number of moves can be sent. Errors: ResourceExhausted (TOO_MANY_MOVES,
@@ -200,8 +184,7 @@ class SceneRegistry {
   Motion MotionOf(const Pose& pose, double glide_s) const;
 
   Mixer& mixer_;
-  TransferStore* transfers_;
-  BodyCache bodies_;
+  ObjectMaker maker_;
   RejectionCounts rejections_;
   SceneVolumes volumes_;
   /// The number of calls of TakeOverTransfers. Objects during whose making it grows may lack a
