@@ -2,7 +2,9 @@
 """The Python package against the real daemon: what it is, scenes with ids, all jobs, and what a rendering tells."""
 
 import asyncio
+import hashlib
 import os
+import pathlib
 import subprocess
 import sys
 import tempfile
@@ -13,6 +15,7 @@ import numpy
 import carillon
 import meshes
 from carillon.v1 import audio_service_pb2
+from certificates import Authority
 from daemon import Daemon, DaemonTest
 
 BAR = meshes.box(meshes.BAR_SIZE)
@@ -311,6 +314,36 @@ async def ask():
 print(carillon.connect({daemon.listening[1].split()[-1]!r}).info().version, asyncio.run(ask()).version)
 """, http_proxy="http://127.0.0.1:1", no_proxy="")
         self.assertEqual(said, [carillon.__version__] * 2)
+
+    def test_both_faces_show_their_token(self):
+        folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
+        authority = Authority(folder)
+        certificate, key = authority.issue("server")
+        access = folder / "access"
+        access.touch(0o600)
+        access.write_text(f"robot strike,listen sha256:{hashlib.sha256(b'a token').hexdigest()}\n")
+        daemon = Daemon(folder, "--listen", "127.0.0.1:0", "--tls-certificate", certificate, "--tls-key", key,
+                        "--access-file", access)
+        self.addCleanup(daemon.stop)
+        address, options = daemon.listening[1].split()[-1], {"tls_roots": authority.certificate}
+
+        def step_count(token):
+            with carillon.connect(address, token=token, **options) as c, c.scene() as scene:
+                with scene.stream(step=0.01) as stream:
+                    stream.step(0.0)
+                return stream.report.step_count
+
+        async def awaited_step_count(token):
+            async with carillon.aio.connect(address, token=token, **options) as c, await c.scene() as scene:
+                async with scene.stream(step=0.01) as stream:
+                    await stream.step(0.0)
+                return stream.report.step_count
+
+        for count in step_count, lambda token: asyncio.run(awaited_step_count(token)):
+            self.assertEqual(count("a token"), 1)
+            with self.assertRaises(carillon.CarillonError) as refused:
+                count("another")
+            self.assertEqual(refused.exception.reason, "TOKEN_WRONG")
 
     def test_no_transfer_means_no_decay_by_radiation(self):
         numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))
