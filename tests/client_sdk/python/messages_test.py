@@ -16,7 +16,7 @@ import numpy
 
 import carillon
 from carillon.v1 import (
-    audio_service_pb2, contact_pb2, contact_service_pb2, decomposition_pb2, error_pb2, modal_model_service_pb2,
+    audio_service_pb2, contact_service_pb2, decomposition_pb2, error_pb2, modal_model_service_pb2,
     scene_service_pb2, warning_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)

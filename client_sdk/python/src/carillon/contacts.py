@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import numbers
 import operator
 from collections.abc import Iterator

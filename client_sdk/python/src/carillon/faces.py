@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Coroutine, Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Optional, TypeVar, Union, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Optional, TypeVar, overload
 
 if TYPE_CHECKING:
     from typing_extensions import Concatenate, ParamSpec, Self
 
     P = ParamSpec("P")
 else:
-    P, Self = TypeVar("P"), Any
+    P = TypeVar("P")
 Result = TypeVar("Result")
 
 
