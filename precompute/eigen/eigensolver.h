@@ -13,7 +13,7 @@ namespace carillon::precompute {
 struct Modes {
   Eigen::VectorXd eigenvalues;  ///< 1/s^2
   Eigen::MatrixXd shapes;       ///< one row for each unknown; phi^T M phi = 1
-  int basis_size = 0;           ///< vectors that block Lanczos built; zero for other solvers
+  int basis_size = 0;           ///< vectors that block Lanczos built; zero for others
 };
 
 /// A request for the lowest modes of a system, including rigid-body modes.
@@ -23,10 +23,6 @@ struct ModeRequest {
   /// An upper bound near the highest eigenvalue wanted. This bound sets the scale of shifts.
   double eigenvalue_limit;
 };
-
-/// The solvers that a user can choose from. With kBlockLanczos, LAPACK's dense solver handles small
-/// bodies, and bodies of which a large part of all modes is wanted.
-enum class SolverChoice { kBlockLanczos, kSpectra };
 
 /// Called with the estimated fraction of the iteration that is done, 0 to 1.
 using SolveProgress = std::function<void(double)>;

@@ -85,12 +85,6 @@ constexpr double kRefineSeconds = 30e-9;
 constexpr double kVerifySeconds = 12e-9;
 constexpr double kModelSeconds = 100e-9;
 
-/// The cost of Spectra, which solves for one vector at a time: solves for each mode, bytes of the
-/// factor and operations on the basis a second.
-constexpr double kSpectraSolvesOfMode = 4;
-constexpr double kSpectraSolveRate = 3e9;
-constexpr double kSpectraOrthogonalRate = 3e9;
-
 }  // namespace
 
 double PredictBasisSize(int mode_count) { return 2.6 * mode_count + 120; }
@@ -126,22 +120,6 @@ SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thr
                  n * p * kRefineSeconds + kRitzSeconds * m * m * m;
   cost.verify_s = n * p * p / kDoubleRate + n * p * kVerifySeconds;
   cost.model_s = n * p * kModelSeconds;
-  return cost;
-}
-
-SolveCost PredictSpectraCost(const OrderedSystem& ordered, int mode_count, int thread_count) {
-  SolveCost cost = PredictSolveCost(ordered, mode_count, thread_count);
-  const auto unknowns = static_cast<double>(3 * ordered.fronts.order.size());
-  const size_t factor = FactorNumbers(ordered.fronts) * kDouble;
-  const size_t vectors = static_cast<size_t>(SpectraBasisSize(mode_count) + 2 * mode_count);
-  const size_t basis = vectors * 3 * ordered.fronts.order.size() * kDouble;
-  // The shifted stiffness and the permuted mass are copies of the matrices.
-  cost.peak_bytes = std::max(cost.peak_bytes, 3 * cost.matrix_bytes + factor + basis);
-  const double solves = kSpectraSolvesOfMode * mode_count + 30;
-  const double basis_size = SpectraBasisSize(mode_count);
-  cost.factor_s = ordered.fronts.factor_flops / kDoubleRate;
-  cost.solve_s = solves * (2 * static_cast<double>(factor) / kSpectraSolveRate +
-                           4 * unknowns * basis_size / kSpectraOrthogonalRate);
   return cost;
 }
 

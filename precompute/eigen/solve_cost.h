@@ -29,12 +29,6 @@ double PredictBasisSize(int mode_count);
 /// Predicts the cost of BlockLanczosEigensolver. `mode_count` includes rigid-body modes.
 SolveCost PredictSolveCost(const OrderedSystem& ordered, int mode_count, int thread_count);
 
-/// Returns the number of vectors in Spectra's basis between two restarts.
-inline int SpectraBasisSize(int mode_count) { return 2 * mode_count + 30; }
-
-/// Predicts the cost of SparseEigensolver, which is Spectra with CHOLMOD.
-SolveCost PredictSpectraCost(const OrderedSystem& ordered, int mode_count, int thread_count);
-
 /// Checks that the machine has the memory available that `cost` needs in addition to the matrices.
 /// Errors: MEMORY_TOO_SMALL with the figures needed_bytes and available_bytes.
 absl::Status CheckMemory(const SolveCost& cost);

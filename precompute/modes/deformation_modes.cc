@@ -13,7 +13,6 @@
 #include "precompute/eigen/block_lanczos_eigensolver.h"
 #include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/eigen/solve_cost.h"
-#include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/fem/held_nodes.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/modes/lower_limit.h"
@@ -58,15 +57,6 @@ void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
 
 int GuessModeCount(const SystemMatrices& system, double limit) {
   return static_cast<int>(std::min<double>(WeylModeCount(system, limit), kMaxFoundModeCount));
-}
-
-/// Returns the unknowns of the nodes in the order of the nodes, three for each.
-std::vector<int> UnknownsOf(const std::vector<int32_t>& nodes) {
-  std::vector<int> unknowns;
-  for (const int32_t node : nodes) {
-    for (int a = 0; a < 3; ++a) unknowns.push_back(3 * node + a);
-  }
-  return unknowns;
 }
 
 /// Number of modes that are found whatever their cost, as long as there is memory for them.
@@ -202,15 +192,9 @@ class Solution {
     return cost.peak_bytes <= options_.means->bytes && cost.cpu_seconds() <= options_.means->cpu_s;
   }
 
-  bool IsDense(int count) const {
-    return options_.solver == SolverChoice::kBlockLanczos &&
-           PrefersDense(system_.unknown_count(), count);
-  }
+  bool IsDense(int count) const { return PrefersDense(system_.unknown_count(), count); }
 
   SolveCost Cost(int count) const {
-    if (options_.solver == SolverChoice::kSpectra) {
-      return PredictSpectraCost(ordered_, count, ThreadCount());
-    }
     SolveCost cost = PredictSolveCost(ordered_, count, ThreadCount());
     if (!IsDense(count)) return cost;
     cost.factor_s = 0;
@@ -219,9 +203,6 @@ class Solution {
   }
 
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
-    if (options_.solver == SolverChoice::kSpectra) {
-      return std::make_unique<SparseEigensolver>(UnknownsOf(ordered_.fronts.order));
-    }
     if (IsDense(count)) return std::make_unique<DenseEigensolver>();
     return std::make_unique<BlockLanczosEigensolver>(ordered_, rigid_);
   }

@@ -20,7 +20,7 @@ struct SolveWork {
   double factor_multiply_adds = 0;  ///< of one factorization
   double factor_entries = 0;
   double unknowns = 0;
-  int basis_size = 0;  ///< vectors that block Lanczos built; zero for other solvers
+  int basis_size = 0;  ///< vectors that block Lanczos built; zero for the dense solver
 };
 
 /// All verified deformation modes of a body below an eigenvalue. Its rigid-body modes (six, or
@@ -65,7 +65,6 @@ struct Means {
 };
 
 struct SolveOptions {
-  SolverChoice solver = SolverChoice::kBlockLanczos;
   std::vector<Point> held = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
   /// If this is set, the limit is lowered until the modes below it cost at most these means and are
@@ -82,8 +81,7 @@ struct SolveOptions {
 ///
 /// `nodes` are the positions of the nodes, in the order of the unknowns.
 /// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before memory is allocated),
-/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED; with SolverChoice::kSpectra also
-/// INVALID_SETTINGS (Spectra cannot find this many modes of so few unknowns).
+/// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,
                                                        double eigenvalue_limit,

@@ -11,7 +11,7 @@
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/deformation_modes.h"
-#include "precompute/modes/solver_comparison.h"
+#include "precompute/modes/spectra_check.h"
 
 namespace carillon::precompute {
 
@@ -30,8 +30,8 @@ struct ModalModel {
   /// stored.
   double lowest_error = 0;
   Verification verification;
-  /// The comparison with another solver, if one was requested.
-  std::optional<SolverComparison> comparison;
+  /// The comparison with Spectra, if it was requested.
+  std::optional<SpectraCheck> check;
   int left_out_mode_count = 0;  ///< modes that were found but not kept, see KeepMostAudible
   /// Warnings for the user.
   std::vector<std::string> warnings;

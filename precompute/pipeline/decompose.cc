@@ -15,7 +15,6 @@
 #include "absl/strings/str_format.h"
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/curved_element.h"
-#include "precompute/fem/matrix_market.h"
 #include "precompute/mesh/boundary.h"
 #include "precompute/mesh/fill/element_size.h"
 #include "precompute/mesh/fill/midside_nodes.h"
@@ -24,7 +23,7 @@
 #include "precompute/mesh/surface/prepare_surface.h"
 #include "precompute/modes/audible_modes.h"
 #include "precompute/modes/deformation_modes.h"
-#include "precompute/modes/solver_comparison.h"
+#include "precompute/modes/spectra_check.h"
 #include "precompute/pipeline/graded_size.h"
 #include "precompute/pipeline/model_checks.h"
 #include "precompute/pipeline/model_warnings.h"
@@ -152,53 +151,28 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
   return Fillable{std::move(given), *std::move(prepared), std::move(read.names)};
 }
 
-absl::Status SaveMatrices(const SystemMatrices& system, const v1::WorkerRequest& request) {
-  const std::string& folder = request.matrices_folder();
-  if (folder.empty()) return absl::OkStatus();
-  RETURN_IF_ERROR(
-      WriteMatrixMarket(absl::StrCat(folder, "/K.mtx"), system.K, request.material().young_pa()));
-  return WriteMatrixMarket(absl::StrCat(folder, "/M.mtx"), system.M,
-                           request.material().density_kg_per_m3());
-}
-
 /// The goal for a surface if nobody asked for another. Its processor time is the predicted one, so
 /// that each machine makes the same model. The prediction for thin plates is about half the time
 /// that they take.
 constexpr ResolutionGoal kUsualGoal{.accuracy = kGreatError, .budget_s = kUsualMeans.cpu_s / 2};
 
-SolveOptions OptionsOf(v1::Solver solver, const v1::WorkerRequest& request,
-                       DecompositionObserver& observer) {
+SolveOptions OptionsOf(const v1::WorkerRequest& request, DecompositionObserver& observer) {
   const bool may_lower_band =
       UseOf(request).high_is_default && request.settings().keep_mode_count() == 0;
-  return {.solver = ToSolverChoice(solver),
-          .max_mode_count =
+  return {.max_mode_count =
               request.settings().keep_mode_count() > 0 ? kMaxFoundModeCount : kMaxModeCount,
           .means = may_lower_band ? std::optional(kUsualMeans) : std::nullopt,
           .on_cost = [&observer](const SolveCost& cost) { observer.OnPlan(PlanOf(cost)); }};
 }
 
 absl::StatusOr<DeformationModes> FindModes(const SystemMatrices& system, const TetMesh& mesh,
-                                           v1::Solver solver, const v1::WorkerRequest& request,
+                                           const v1::WorkerRequest& request,
                                            DecompositionObserver& observer) {
   const IntendedUse use = UseOf(request);
   return SolveDeformationModes(
       system, mesh, use.UnitEigenvalue(use.high_hz),
       [&](SolveStage stage, double done) { observer.OnProgress(PhaseOf(stage), done); },
-      OptionsOf(solver, request, observer));
-}
-
-/// The opinion of the solver that the request checks with. Where that one fails, the comparison
-/// says why: the modes that were found remain right.
-SolverComparison CheckWithOther(const SystemMatrices& system, const TetMesh& mesh,
-                                const Modes& modes, const v1::WorkerRequest& request,
-                                DecompositionObserver& observer) {
-  const v1::Solver other = request.settings().check_with();
-  const absl::StatusOr<DeformationModes> second = FindModes(system, mesh, other, request, observer);
-  SolverComparison result;
-  if (second.ok()) result = CompareSolutions(system, mesh, modes, second->modes);
-  result.failure = std::string(second.status().message());
-  result.solver = other == v1::SOLVER_SPECTRA ? "Spectra" : "block Lanczos";
-  return result;
+      OptionsOf(request, observer));
 }
 
 /// A model, and the processor time that was predicted for it, which is the same on each machine.
@@ -215,20 +189,19 @@ absl::StatusOr<Solved> Solve(const Body& body, const v1::WorkerRequest& request,
   observer.OnProgress(v1::PHASE_ASSEMBLE, 0);
   const ElasticConstants elastic{.young_pa = 1, .poisson_ratio = settings.poisson_ratio()};
   const SystemMatrices system = Assemble(body.mesh, elastic, 1, MassSharingOf(request));
-  RETURN_IF_ERROR(SaveMatrices(system, request));
   ASSIGN_OR_RETURN(const DeformationModes solution,
-                   FindModes(system, body.mesh, settings.solver(), request, observer));
-  std::optional<SolverComparison> comparison;
-  if (settings.check_with() != v1::SOLVER_UNSPECIFIED) {
-    comparison = CheckWithOther(system, body.mesh, solution.modes, request, observer);
+                   FindModes(system, body.mesh, request, observer));
+  std::optional<SpectraCheck> check;
+  if (settings.check_with() == v1::SOLVER_SPECTRA) {
+    check = CheckWithSpectra(system, body.mesh, solution);
   }
   observer.OnProgress(v1::PHASE_WRITE, 0);
   ModalModel model = MakeModalModel(body.mesh, body.given, elastic, solution);
   model.warnings = body.warnings;
   for (double& error : model.estimated_errors) error += body.frequency_error;
   WarnOfLowerBand(solution, UseOf(request), Diagonal(body.mesh.nodes), model);
-  if (comparison) model.warnings.push_back(comparison->Text());
-  model.comparison = std::move(comparison);
+  if (check) model.warnings.push_back(check->Text());
+  model.check = std::move(check);
   KeepMostAudible(static_cast<int>(settings.keep_mode_count()), model);
   return Solved{std::move(model), solution.predicted_cpu_s};
 }

@@ -129,8 +129,4 @@ std::vector<Fixture> FixturesOf(const v1::WorkerRequest& request) {
   return fixtures;
 }
 
-SolverChoice ToSolverChoice(v1::Solver solver) {
-  return solver == v1::SOLVER_SPECTRA ? SolverChoice::kSpectra : SolverChoice::kBlockLanczos;
-}
-
 }  // namespace carillon::precompute

@@ -6,7 +6,6 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
-#include "precompute/eigen/eigensolver.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/mesh/hold.h"
@@ -30,6 +29,5 @@ MeshingSettings MeshingOf(const v1::WorkerRequest& request);
 ResolutionGoal GoalOf(const v1::WorkerRequest& request);
 MassSharing MassSharingOf(const v1::WorkerRequest& request);
 std::vector<Fixture> FixturesOf(const v1::WorkerRequest& request);
-SolverChoice ToSolverChoice(v1::Solver solver);
 
 }  // namespace carillon::precompute

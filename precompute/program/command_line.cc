@@ -103,11 +103,6 @@ void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) 
          "--cautious", [&](int64_t) { request.set_cautious(true); },
          "Mesh with a coarser tolerance and rougher elements, where the mesher fails")
       ->group(kUseGroup);
-  app.add_option_function<std::string>(
-         "--matrices", [&](const std::string& folder) { request.set_matrices_folder(folder); },
-         "Folder for K.mtx and M.mtx (Matrix Market, SI, nodes in the file's order, three "
-         "unknowns a node)")
-      ->group(kUseGroup);
 }
 
 void AddRadiationOptions(CLI::App& app, v1::WorkerRequest& request) {

@@ -136,14 +136,12 @@ Json Verified(const Verification& verification, const IntendedUse& use) {
           {"counted_below_hz", use.FrequencyHz(verification.sturm_eigenvalue)}};
 }
 
-Json Check(const SolverComparison& comparison) {
-  if (!comparison.failure.empty()) {
-    return {{"solver", comparison.solver}, {"failure", comparison.failure}};
-  }
-  return {{"solver", comparison.solver},
-          {"mode_count", comparison.other_mode_count},
-          {"largest_frequency_difference", comparison.largest_frequency_difference},
-          {"least_mac", comparison.least_mac}};
+Json Check(const SpectraCheck& check) {
+  if (!check.failure.empty()) return {{"solver", "Spectra"}, {"failure", check.failure}};
+  return {{"solver", "Spectra"},
+          {"mode_count", check.spectra_mode_count},
+          {"largest_frequency_difference", check.largest_frequency_difference},
+          {"least_mac", check.least_mac}};
 }
 
 }  // namespace
@@ -163,7 +161,7 @@ std::string JsonReport(const ModalModel& model, const Transfer* transfer, const 
                  {"verification", Verified(model.verification, use)},
                  {"warnings", model.warnings},
                  {"modes", ModesInBand(model, transfer, use)}};
-  if (model.comparison) report["check"] = Check(*model.comparison);
+  if (model.check) report["check"] = Check(*model.check);
   if (transfer != nullptr) report["radiation"] = RadiationSummary(*transfer);
   return Text(report);
 }

@@ -119,9 +119,6 @@ void OpenStandardStreams() {
 std::vector<std::string> FilesToWrite(const CommandLine& asked) {
   std::vector<std::string> files{asked.output};
   if (!asked.transfer_output.empty()) files.push_back(asked.transfer_output);
-  if (const std::string& folder = asked.request.matrices_folder(); !folder.empty()) {
-    files.push_back(folder + "/K.mtx");
-  }
   return files;
 }
 

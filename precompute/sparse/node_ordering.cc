@@ -102,31 +102,20 @@ Adjacency Contract(const Adjacency& graph, const Pairs& pairs) {
   return coarse;
 }
 
-/// Nested dissection. `weights`: weights of the nodes; empty: all equal.
+/// Nested dissection of a graph whose vertices have these weights.
 std::vector<idx_t> Dissect(Adjacency& graph, std::vector<idx_t> weights) {
   idx_t node_count = graph.node_count();
   std::vector<idx_t> order(static_cast<size_t>(node_count));
   std::vector<idx_t> position(order.size());
   std::iota(order.begin(), order.end(), 0);
   if (!graph.neighbours.empty()) {
-    METIS_NodeND(&node_count, graph.start.data(), graph.neighbours.data(),
-                 weights.empty() ? nullptr : weights.data(), nullptr, order.data(),
-                 position.data());
+    METIS_NodeND(&node_count, graph.start.data(), graph.neighbours.data(), weights.data(), nullptr,
+                 order.data(), position.data());
   }
   return order;
 }
 
 }  // namespace
-
-std::vector<int> OrderUnknowns(const SystemMatrices& system) {
-  Adjacency graph = MakeAdjacency(system.K);
-  std::vector<int> unknowns;
-  unknowns.reserve(3 * (graph.start.size() - 1));
-  for (const idx_t node : Dissect(graph, {})) {
-    for (int a = 0; a < 3; ++a) unknowns.push_back(3 * static_cast<int>(node) + a);
-  }
-  return unknowns;
-}
 
 std::vector<int> OrderThinWall(const SystemMatrices::Sparse& K) {
   // This ratio is about 0.3 for a wall one element thick and 0.7 for a solid.

@@ -7,11 +7,6 @@
 
 namespace carillon::precompute {
 
-/// Returns a pivot order of the unknowns that keeps factors sparse. Element k is the unknown
-/// eliminated k-th. The order is a nested dissection of the graph of nodes, which has a third of
-/// the size of the graph of unknowns. The three unknowns of a node follow one another.
-std::vector<int> OrderUnknowns(const SystemMatrices& system);
-
 /// Returns an order of the nodes of a body whose walls are mostly one element thick. Each pair of
 /// nodes across the wall counts as one vertex of the graph, so that the order is found in less than
 /// half the time, with an equally sparse factor. Returns an empty order if the mesh is not mostly

@@ -47,23 +47,18 @@ absl::Status CheckFixtures(const v1::DecompositionSettings& settings) {
 }
 
 absl::Status CheckChoices(const v1::DecompositionSettings& settings) {
-  if (!v1::Element_IsValid(settings.element()) || !v1::MassMatrix_IsValid(settings.mass_matrix()) ||
-      !v1::Solver_IsValid(settings.solver()) || !v1::Solver_IsValid(settings.check_with())) {
-    return Invalid(
-        "element, mass_matrix, solver or check_with has a value that this program does not know; "
-        "use a newer program, or a value that proto/carillon/v1/modal_model.proto lists");
+  if (v1::Element_IsValid(settings.element()) && v1::MassMatrix_IsValid(settings.mass_matrix()) &&
+      v1::Solver_IsValid(settings.check_with())) {
+    return absl::OkStatus();
   }
-  if (settings.check_with() != settings.solver()) return absl::OkStatus();
-  return Invalid("check_with names the solver itself; name another one, or leave it out");
+  return Invalid(
+      "element, mass_matrix or check_with has a value that this program does not know; use a newer "
+      "program, or a value that proto/carillon/v1/modal_model.proto lists");
 }
 
 absl::string_view KeepSurface(const v1::MeshSettings& mesh) {
   if (!mesh.has_keep_surface()) return "auto";
   return mesh.keep_surface() ? "yes" : "no";
-}
-
-absl::string_view SolverName(v1::Solver solver) {
-  return solver == v1::SOLVER_SPECTRA ? "spectra" : "block_lanczos";
 }
 
 /// The lines of settings that stand in the text only where they are not the default.
@@ -81,9 +76,7 @@ std::string LaterLines(const v1::DecompositionSettings& settings) {
   add(settings.keep_mode_count() > 0, "keep ", settings.keep_mode_count());
   add(settings.max_frequency_error() > 0, "max_frequency_error ",
       ShortestDecimal(settings.max_frequency_error()));
-  add(settings.solver() == v1::SOLVER_SPECTRA, "solver ", SolverName(settings.solver()));
-  add(settings.check_with() != v1::SOLVER_UNSPECIFIED, "check_with ",
-      SolverName(settings.check_with()));
+  add(settings.check_with() == v1::SOLVER_SPECTRA, "check_with spectra");
   return text;
 }
 
@@ -110,7 +103,6 @@ void FillInDefaults(v1::DecompositionSettings& settings) {
     settings.set_mass_matrix(v1::MASS_MATRIX_CONSISTENT);
   }
   if (settings.metres_per_unit() == 0) settings.set_metres_per_unit(1);
-  if (settings.solver() == v1::SOLVER_UNSPECIFIED) settings.set_solver(v1::SOLVER_BLOCK_LANCZOS);
 }
 
 absl::Status CheckSettings(const v1::DecompositionSettings& settings) {

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <xxhash.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -56,33 +55,6 @@ TEST_F(ProgramFilesTest, ModelFileIsTheStoredForm) {
   std::memcpy(&first, arrays[0].data(), sizeof first);
   EXPECT_NEAR(std::sqrt(first * 210e9 / 7850) / (2 * std::numbers::pi),
               report.at("modes")[0].at("frequency_hz").get<double>(), 1e-6);
-}
-
-TEST_F(ProgramFilesTest, MatricesAreThoseSolved) {
-  const Json report = Json::parse(RunBar(std::string(kSteel) + " --matrices " + folder).output);
-  const auto read = [&](const std::string& name) {
-    std::ifstream file(folder + "/" + name);
-    std::string banner;
-    std::getline(file, banner);
-    EXPECT_EQ(banner, "%%MatrixMarket matrix coordinate real symmetric");
-    Eigen::Index rows = 0, columns = 0, entries = 0, row = 0, column = 0;
-    file >> rows >> columns >> entries;
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, columns);
-    double value = 0;
-    while (file >> row >> column >> value) {
-      matrix(row - 1, column - 1) = matrix(column - 1, row - 1) = value;
-    }
-    return matrix;
-  };
-  const Eigen::MatrixXd K = read("K.mtx");
-  const Eigen::MatrixXd M = read("M.mtx");
-  ASSERT_EQ(K.rows(), report.at("unknowns"));
-  EXPECT_NEAR(M.sum(), 3 * 7850 * 0.1 * 0.02 * 0.012, 1e-9);
-  const Eigen::VectorXd eigenvalues =
-      Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly)
-          .eigenvalues();
-  EXPECT_NEAR(std::sqrt(eigenvalues[6]) / (2 * std::numbers::pi),
-              report.at("modes")[0].at("frequency_hz").get<double>(), 1e-3);
 }
 
 TEST_F(ProgramFilesTest, FilesThatAreNotThereAreRefused) {

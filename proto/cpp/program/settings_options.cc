@@ -117,13 +117,7 @@ void AddModes(CLI::App& app, Settings& settings) {
             "leave out modes whose frequency is estimated to be off by more, such as 2% or 0.02",
             [&](double share) { settings.set_max_frequency_error(share); })
       ->group(kSettingsGroup);
-  const std::map<std::string, v1::Solver> solvers = {{"block-lanczos", v1::SOLVER_BLOCK_LANCZOS},
-                                                     {"spectra", v1::SOLVER_SPECTRA}};
-  AddChoice<v1::Solver>(app, "--solver", solvers,
-                        "solver that finds the modes; Spectra is an independent, slower one "
-                        "[block-lanczos]",
-                        [&](v1::Solver solver) { settings.set_solver(solver); });
-  AddChoice<v1::Solver>(app, "--check-with", solvers,
+  AddChoice<v1::Solver>(app, "--check-with", {{"spectra", v1::SOLVER_SPECTRA}},
                         "find the modes with this solver, too, and say how far apart both are",
                         [&](v1::Solver solver) { settings.set_check_with(solver); });
 }

@@ -9,10 +9,9 @@
 #include <vector>
 
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/eigen/verification.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/sparse/node_ordering.h"
+#include "precompute/modes/spectra_check.h"
 #include "precompute/sparse/openblas.h"
 #include "tests/precompute/test_meshes.h"
 
@@ -101,9 +100,7 @@ TEST(BlockLanczos, ThreadsChangeRoundingOnly) {
 TEST(BlockLanczos, AgreesWithSpectraOnATube) {
   Body body(MakeTetTube({.around = 16, .along = 30}, 10), MassSharing::kConsistent);
   const ModeRequest request{.count = 60, .eigenvalue_limit = kLimit};
-  const Modes spectra = SparseEigensolver(OrderUnknowns(body.system))
-                            .Solve(body.system, request, [](double) {})
-                            .value();
+  const Modes spectra = SolveWithSpectra(body.system, request).value();
   ExpectSameModes(body.system, body.Solve(60), spectra);
 }
 

@@ -4,10 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/eigen/sparse_eigensolver.h"
 #include "precompute/eigen/verification.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/sparse/node_ordering.h"
+#include "precompute/modes/spectra_check.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -23,8 +22,7 @@ SystemMatrices AssembleUnit(const TetMesh& mesh) {
 /// The modes that bend, of which `count` are wanted.
 Modes SolveSparse(const SystemMatrices& system, int count, double limit) {
   const absl::StatusOr<Modes> modes =
-      SparseEigensolver(OrderUnknowns(system))
-          .Solve(system, {.count = count, .eigenvalue_limit = limit}, kSilent);
+      SolveWithSpectra(system, {.count = count, .eigenvalue_limit = limit});
   EXPECT_TRUE(modes.ok()) << modes.status();
   return *modes;
 }

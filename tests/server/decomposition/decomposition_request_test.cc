@@ -68,7 +68,6 @@ TEST(DecompositionRequest, ModelsKeepTheirNames) {
   settings.mutable_mesh()->set_budget_s(60);
   settings.mutable_mesh()->set_budget_gib(1.5);
   settings.set_keep_mode_count(2000);
-  settings.set_solver(v1::SOLVER_BLOCK_LANCZOS);
   settings.add_fixtures()->set_group("rim");
   settings.add_fixtures()->mutable_vertices()->add_indices(3);
   EXPECT_EQ(CanonicalText(*ResolveRequest(request)),
@@ -139,7 +138,6 @@ TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(true); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_keep_surface(false); },
       [](Request& r) { r.mutable_settings()->mutable_mesh()->set_target_node_count(500); },
-      [](Request& r) { r.mutable_settings()->set_solver(v1::SOLVER_SPECTRA); },
       [](Request& r) { r.mutable_settings()->set_check_with(v1::SOLVER_SPECTRA); },
       [](Request& r) { r.mutable_settings()->set_max_frequency_error(0.02); },
       [](Request& r) { r.mutable_settings()->add_fixtures()->set_group("base"); },

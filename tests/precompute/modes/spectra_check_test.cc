@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
 // Spectra as a second opinion on block Lanczos.
-#include "precompute/modes/solver_comparison.h"
+#include "precompute/modes/spectra_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,34 +30,30 @@ TetMesh TubeMesh(int nodes_per_element, bool clamped) {
   return mesh;
 }
 
-absl::StatusOr<DeformationModes> Solve(const SystemMatrices& system, const TetMesh& mesh,
-                                       double limit, SolverChoice solver) {
-  return SolveDeformationModes(system, mesh, limit, kSilent, {.solver = solver});
+absl::StatusOr<DeformationModes> Solve(const SystemMatrices& system, const TetMesh& mesh) {
+  return SolveDeformationModes(system, mesh, 40, kSilent);
 }
 
-struct SolverComparisonTest : ::testing::TestWithParam<std::tuple<int, MassSharing, bool>> {};
+struct SpectraCheckTest : ::testing::TestWithParam<std::tuple<int, MassSharing, bool>> {};
 
-TEST_P(SolverComparisonTest, BothSolversFindTheSameModes) {
+TEST_P(SpectraCheckTest, BothSolversFindTheSameModes) {
   const auto& [nodes_per_element, mass, clamped] = GetParam();
   const TetMesh mesh = TubeMesh(nodes_per_element, clamped);
   const SystemMatrices system = Assemble(mesh, kElastic, 1, mass);
-  constexpr double kLimit = 40;
-  const auto lanczos = Solve(system, mesh, kLimit, SolverChoice::kBlockLanczos);
-  const auto spectra = Solve(system, mesh, kLimit, SolverChoice::kSpectra);
+  const auto lanczos = Solve(system, mesh);
   ASSERT_TRUE(lanczos.ok()) << lanczos.status();
-  ASSERT_TRUE(spectra.ok()) << spectra.status();
-  const SolverComparison comparison =
-      CompareSolutions(system, mesh, lanczos->modes, spectra->modes);
-  EXPECT_GT(comparison.mode_count, 5);
-  EXPECT_EQ(comparison.mode_count, comparison.other_mode_count);
+  const SpectraCheck check = CheckWithSpectra(system, mesh, *lanczos);
+  EXPECT_EQ(check.failure, "");
+  EXPECT_GT(check.mode_count, 5);
+  EXPECT_EQ(check.mode_count, check.spectra_mode_count);
   // The error of a frequency is at most the square of its relative residual, 1e-5, over the
   // relative gap to its neighbours, 1e-3.
-  EXPECT_LT(comparison.largest_frequency_difference, 1e-7);
+  EXPECT_LT(check.largest_frequency_difference, 1e-7);
   // Residuals of 1e-5 over gaps of 1e-3 turn a shape by 1e-2 at most.
-  EXPECT_GT(comparison.least_mac, 1 - 1e-4);
+  EXPECT_GT(check.least_mac, 1 - 1e-4);
 }
 
-INSTANTIATE_TEST_SUITE_P(Bodies, SolverComparisonTest,
+INSTANTIATE_TEST_SUITE_P(Bodies, SpectraCheckTest,
                          ::testing::Combine(::testing::Values(4, 10),
                                             ::testing::Values(MassSharing::kConsistent,
                                                               MassSharing::kLumped),
@@ -66,7 +62,8 @@ INSTANTIATE_TEST_SUITE_P(Bodies, SolverComparisonTest,
 struct SelfComparisonTest : ::testing::Test {
   TetMesh mesh = TubeMesh(4, false);
   SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
-  Modes modes = Solve(system, mesh, 40, SolverChoice::kBlockLanczos)->modes;
+  DeformationModes solution = *Solve(system, mesh);
+  Modes modes = solution.modes;
 };
 
 TEST_F(SelfComparisonTest, APairOfOneFrequencyMayBeTurnedWithinItself) {
@@ -75,28 +72,41 @@ TEST_F(SelfComparisonTest, APairOfOneFrequencyMayBeTurnedWithinItself) {
   ASSERT_LT(modes.eigenvalues[1] / modes.eigenvalues[0] - 1, 1e-6);
   turned.shapes.col(0) = std::cos(1.0) * modes.shapes.col(0) + std::sin(1.0) * modes.shapes.col(1);
   turned.shapes.col(1) = std::cos(1.0) * modes.shapes.col(1) - std::sin(1.0) * modes.shapes.col(0);
-  EXPECT_NEAR(CompareSolutions(system, mesh, modes, turned).least_mac, 1, 1e-9);
+  EXPECT_NEAR(CompareModes(system, mesh, modes, turned).least_mac, 1, 1e-9);
 }
 
 TEST_F(SelfComparisonTest, AShapeOfAnotherModeIsSeen) {
   Modes wrong = modes;
   wrong.shapes.col(0) = modes.shapes.rightCols<1>();
-  EXPECT_NEAR(CompareSolutions(system, mesh, modes, wrong).least_mac, 0, 1e-6);
+  EXPECT_NEAR(CompareModes(system, mesh, modes, wrong).least_mac, 0, 1e-6);
 }
 
 TEST_F(SelfComparisonTest, TheLargestDifferenceOfAFrequencyIsSeen) {
   Modes off = modes;
   ASSERT_GT(modes.eigenvalues.size(), 4);
   off.eigenvalues[3] *= 1.02 * 1.02;
-  EXPECT_NEAR(CompareSolutions(system, mesh, modes, off).largest_frequency_difference, 0.02, 1e-9);
+  EXPECT_NEAR(CompareModes(system, mesh, modes, off).largest_frequency_difference, 0.02, 1e-9);
 }
 
-TEST(Spectra, RefusesMoreModesThanItCanFind) {
+TEST_F(SelfComparisonTest, AModeThatTheModelLacksIsCounted) {
+  DeformationModes fewer = solution;
+  const Eigen::Index left = modes.eigenvalues.size() - 1;
+  fewer.modes = {.eigenvalues = modes.eigenvalues.head(left),
+                 .shapes = modes.shapes.leftCols(left)};
+  const SpectraCheck check = CheckWithSpectra(system, mesh, fewer);
+  EXPECT_EQ(check.mode_count, left);
+  EXPECT_EQ(check.spectra_mode_count, left + 1);
+}
+
+TEST(SpectraCheck, SaysThatABodyHasTooFewUnknowns) {
   const TetMesh mesh = MakeTetBox({1, 1, 1}, {1, 1, 1}, 4);
   const SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
-  const auto refused = Solve(system, mesh, 1e6, SolverChoice::kSpectra);
-  EXPECT_THAT(refused.status().ToString(),
+  EXPECT_THAT(SolveWithSpectra(system, {.count = 24, .eigenvalue_limit = 1e6}).status().ToString(),
               HasSubstr("INVALID_SETTINGS: Spectra cannot find 24 modes of 24 unknowns"));
+  const auto all = SolveDeformationModes(system, mesh, 1e6, kSilent);
+  ASSERT_TRUE(all.ok()) << all.status();
+  const SpectraCheck check = CheckWithSpectra(system, mesh, *all);
+  EXPECT_THAT(check.Text(), HasSubstr("found no modes to compare: Spectra cannot find 24 modes"));
 }
 
 }  // namespace
