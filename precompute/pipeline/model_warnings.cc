@@ -2,9 +2,11 @@
 #include "precompute/pipeline/model_warnings.h"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
 
 #include "absl/strings/str_format.h"
+#include "precompute/pipeline/usual_goal.h"
 
 namespace carillon::precompute {
 
@@ -27,6 +29,11 @@ void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, d
       "unit of its file (--unit); %s, or keep the most audible of them (--keep)",
       model.eigenvalues.size(), complete_hz, about, solution.mode_count_below_asked, use.high_hz,
       kUsualMeans.bytes >> 30U, kUsualMeans.cpu_s, use.size * extent_m, more));
+}
+
+void WarnOfOverruns(const ResolutionGoal& goal, double used_s, double used_bytes,
+                    ModalModel& model) {
+  std::ranges::move(OverrunWarnings(goal, used_s, used_bytes), std::back_inserter(model.warnings));
 }
 
 void WarnOfGreatErrors(ModalModel& model) {

@@ -12,15 +12,15 @@ namespace carillon::precompute {
 /// mesh only, because the goal decides the last mesh.
 void WarnOfNodesBesideGoal(int asked_corner_count, const ResolutionGoal& goal, ModalModel& model);
 
-/// The cost above which some modes of a body are left out, if the request does not state the band.
-inline constexpr Means kUsualMeans{.bytes = size_t{7} << 30U, .cpu_s = 60};
-/// Largest estimated error of a frequency that goes without a warning: nearly two semitones.
-inline constexpr double kGreatError = 0.1;
-
 /// Adds a warning if fewer modes were computed than the band has. `extent_m` is the diagonal of the
 /// box around the mesh.
 void WarnOfLowerBand(const DeformationModes& solution, const IntendedUse& use, double extent_m,
                      ModalModel& model);
+
+/// Adds a warning for each budget of `goal` that was exceeded, by `used_s` seconds of processor
+/// time or `used_bytes` of memory.
+void WarnOfOverruns(const ResolutionGoal& goal, double used_s, double used_bytes,
+                    ModalModel& model);
 
 /// Adds a warning if the estimated errors of some frequencies are above kGreatError.
 void WarnOfGreatErrors(ModalModel& model);

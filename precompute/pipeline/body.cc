@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/pipeline/body.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "precompute/fem/curved_element.h"
+#include "precompute/mesh/boundary.h"
+#include "precompute/mesh/fill/midside_nodes.h"
+#include "precompute/mesh/point_math.h"
+#include "precompute/mesh/read/read_mesh.h"
+#include "precompute/pipeline/model_checks.h"
+#include "precompute/pipeline/worker_request.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// Warns if the mesh has many more corner nodes than were asked for, because the surface forces
+/// them.
+void WarnOfMoreNodes(int asked, const TetMesh& mesh, std::vector<std::string>& warnings) {
+  constexpr double kMany = 1.5;
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  std::vector<bool> is_corner(mesh.nodes.size(), false);
+  for (size_t i = 0; i < mesh.elements.size(); ++i) {
+    if (i % stride < 4) is_corner[static_cast<size_t>(mesh.elements[i])] = true;
+  }
+  const auto corner_count = std::ranges::count(is_corner, true);
+  if (asked == 0 || static_cast<double>(corner_count) <= kMany * asked) return;
+  warnings.push_back(absl::StrCat("the mesh has ", corner_count, " corner nodes, not the ", asked,
+                                  " asked for (--nodes), because the surface forces them"));
+}
+
+absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing,
+                                 const v1::WorkerRequest& request) {
+  ASSIGN_OR_RETURN(TetMesh mesh, Tetrahedralize(surface.prepared.surface, meshing));
+  for (BoundaryFace& face : mesh.boundary) {
+    face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
+  }
+  RETURN_IF_ERROR(FixNodes(FixturesOf(request), surface.given, surface.names, mesh));
+  std::vector<std::string> warnings = surface.prepared.warnings;
+  const int asked = static_cast<int>(request.settings().mesh().target_node_count());
+  if (meshing.target_node_count == asked) WarnOfMoreNodes(asked, mesh, warnings);
+  return Body{surface.given, std::move(mesh), std::move(warnings),
+              surface.prepared.frequency_error};
+}
+
+absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
+                                    const v1::WorkerRequest& request) {
+  const int nodes_per_element = MeshingOf(request).nodes_per_element;
+  if (mesh.nodes_per_element > nodes_per_element) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+        "the mesh has tetrahedra of ten nodes, which linear elements have no use for; ask "
+        "for quadratic elements, or give a mesh of four-node tetrahedra");
+  }
+  RETURN_IF_ERROR(CheckCurvedElements(mesh));
+  SurfaceMesh given = BoundarySurface(mesh);
+  if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
+  RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));
+  return Body{.given = std::move(given), .mesh = std::move(mesh), .warnings = {}};
+}
+
+/// Whether the surface may get other triangles. Fixtures can name vertices of the given ones.
+bool MayCoarsen(const v1::WorkerRequest& request) {
+  const v1::MeshSettings& mesh = request.settings().mesh();
+  const std::vector<Fixture> fixtures = FixturesOf(request);
+  return !mesh.has_keep_surface() && mesh.accuracy() == 0 &&
+         std::ranges::none_of(fixtures, [](const Fixture& fixture) {
+           return std::holds_alternative<FixedVertices>(fixture) ||
+                  std::holds_alternative<FixedGroup>(fixture);
+         });
+}
+
+/// Adds the diagonal of the box around a refused surface, metres, which remedies refer to.
+absl::Status WithExtent(absl::Status refusal, const SurfaceMesh& surface) {
+  if (surface.vertices.empty()) return refusal;
+  AddFigure(refusal, "extent_m", absl::StrFormat("%.6g", Diagonal(surface.vertices)));
+  return refusal;
+}
+
+/// Returns the diagonal of the box around a mesh, m.
+double ExtentOf(const Mesh& mesh) {
+  if (const auto* tetrahedra = std::get_if<TetMesh>(&mesh)) return Diagonal(tetrahedra->nodes);
+  return Diagonal(std::get<SurfaceMesh>(mesh).vertices);
+}
+
+}  // namespace
+
+absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerRequest& request,
+                                DecompositionObserver& observer) {
+  observer.OnProgress(v1::PHASE_READ, 0);
+  const v1::DecompositionSettings& settings = request.settings();
+  ASSIGN_OR_RETURN(NamedMesh read,
+                   ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
+  const double extent_m = ExtentOf(read.mesh);
+  observer.OnExtent(UseOf(request).size * extent_m);
+  RETURN_IF_ERROR(CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request)));
+  observer.OnProgress(v1::PHASE_MESH, 0);
+  if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
+    ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names, request));
+    body.warnings = std::move(read.warnings);
+    return body;
+  }
+  auto& given = std::get<SurfaceMesh>(read.mesh);
+  absl::StatusOr<PreparedSurface> prepared =
+      PrepareSurface(given, {.repair = settings.mesh().repair(),
+                             .wall_m = settings.mesh().wall_m(),
+                             .coarsen = MayCoarsen(request),
+                             .most_triangles = 2 * settings.mesh().target_node_count()});
+  if (!prepared.ok()) return WithExtent(prepared.status(), given);
+  std::ranges::move(read.warnings, std::back_inserter(prepared->warnings));
+  return Fillable{std::move(given), *std::move(prepared), std::move(read.names)};
+}
+
+absl::StatusOr<Body> Fill(const Fillable& surface, MeshingSettings meshing,
+                          const v1::WorkerRequest& request) {
+  const double most_node_count = std::exchange(meshing.most_node_count, 0);
+  if (!meshing.relative_size.is_uniform()) {
+    MeshingSettings limited = meshing;
+    limited.most_node_count = most_node_count;
+    absl::StatusOr<Body> graded = FillSurface(surface, limited, request);
+    if (graded.ok() && static_cast<double>(graded->mesh.nodes.size()) <= most_node_count) {
+      graded->graded = true;
+      return graded;
+    }
+    meshing.relative_size = {};
+  }
+  return FillSurface(surface, meshing, request);
+}
+
+}  // namespace carillon::precompute
