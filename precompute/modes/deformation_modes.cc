@@ -12,12 +12,12 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/eigen/block_lanczos_eigensolver.h"
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/eigen/solve_cost.h"
 #include "precompute/fem/held_nodes.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
 #include "precompute/modes/shape_signs.h"
+#include "precompute/modes/solution_cost.h"
 #include "precompute/modes/solution_refusals.h"
 #include "precompute/sparse/dense_blas.h"
 #include "precompute/sparse/multifrontal_cholesky.h"
@@ -38,9 +38,6 @@ constexpr int kMaxAttempts = 3;
 /// stiffest node, is a rigid-body mode.
 constexpr double kFreeMotion = 1e-9;
 constexpr double kRounding = 1e-12;
-
-/// Time of the dense solver divided by the cube of the number of unknowns; see PrefersDense.
-constexpr double kDenseSeconds = 1.4e-10;
 
 /// Keeps the modes with these indices (ascending). Works in place, because shapes fill gigabytes.
 void Keep(const std::vector<Eigen::Index>& which, Modes& modes) {
@@ -120,7 +117,7 @@ class Solution {
   /// Returns the largest number of modes, rigid-body ones included, that the means allow.
   int MostAffordable() const {
     return LargestThat(rigid_mode_count() + kAlwaysAffordable, MostModes(),
-                       [this](int count) { return IsAffordable(count); });
+                       [this](int count) { return Afford(*options_.means, Cost(count)); });
   }
 
   absl::StatusOr<Modes> SolveLowest(int count, double limit) const {
@@ -187,20 +184,9 @@ class Solution {
   }
 
  private:
-  bool IsAffordable(int count) const {
-    const SolveCost cost = Cost(count);
-    return cost.peak_bytes <= options_.means->bytes && cost.cpu_seconds() <= options_.means->cpu_s;
-  }
-
   bool IsDense(int count) const { return PrefersDense(system_.unknown_count(), count); }
 
-  SolveCost Cost(int count) const {
-    SolveCost cost = PredictSolveCost(ordered_, count, ThreadCount());
-    if (!IsDense(count)) return cost;
-    cost.factor_s = 0;
-    cost.solve_s = kDenseSeconds * std::pow(static_cast<double>(system_.unknown_count()), 3);
-    return cost;
-  }
+  SolveCost Cost(int count) const { return CostOfSolution(ordered_, count); }
 
   std::unique_ptr<Eigensolver> MakeSolver(int count) const {
     if (IsDense(count)) return std::make_unique<DenseEigensolver>();
@@ -358,16 +344,6 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
     modes->shapes = Extended(modes->shapes, moving, mesh.nodes.size());
   }
   return result;
-}
-
-bool PrefersDense(Eigen::Index unknown_count, int mode_count) {
-  // Solid boxes of 720, 1944 and 3960 unknowns, CPU seconds: dense 0.16, 1.2, 8.6; block Lanczos
-  // 0.09, 0.75, 4.3 for a tenth of all modes and 0.29, 3.9, 22 for a fifth. Four full matrices of
-  // 10,000 unknowns fill 3.2 GB.
-  constexpr Eigen::Index kSmall = 600;
-  constexpr Eigen::Index kTooLarge = 10'000;
-  return unknown_count <= kSmall ||
-         (unknown_count <= kTooLarge && 8 * Eigen::Index{mode_count} > unknown_count);
 }
 
 }  // namespace carillon::precompute

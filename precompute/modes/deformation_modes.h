@@ -12,6 +12,8 @@
 #include "precompute/eigen/verification.h"
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
+#include "precompute/modes/mode_limits.h"
+#include "precompute/modes/solution_cost.h"
 
 namespace carillon::precompute {
 
@@ -42,27 +44,11 @@ struct DeformationModes {
   SolveWork work;
 };
 
-/// Largest number of modes of a model. More modes never sound at once, and the shapes of more modes
-/// would fill gigabytes.
-inline constexpr int kMaxModeCount = 5000;
-/// Largest number of modes that may be found if only the most audible ones are kept.
-inline constexpr int kMaxFoundModeCount = 20'000;
-
-/// Largest expected number of modes that is reported. A larger expected number is reported as this
-/// number.
-inline constexpr double kMostExpectedModes = 1e9;
-
 /// The stages of a solution. Counting the modes comes first and belongs to kVerify.
 enum class SolveStage { kFactor, kSolve, kVerify };
 
 /// Called with the current stage and the fraction of it that is done, 0 to 1.
 using SolveWatch = std::function<void(SolveStage, double)>;
-
-/// The largest cost of a solution. If all modes would cost more, fewer modes are found.
-struct Means {
-  size_t bytes = 0;  ///< memory, the matrices included
-  double cpu_s = 0;  ///< processor time, as PredictSolveCost() predicts it
-};
 
 struct SolveOptions {
   std::vector<Point> held = {};  ///< positions of the fixed nodes
@@ -94,8 +80,5 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        SolveOptions options = {});
-
-/// Returns whether the dense solver is faster, according to measurements.
-bool PrefersDense(Eigen::Index unknown_count, int mode_count);
 
 }  // namespace carillon::precompute

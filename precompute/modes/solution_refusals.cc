@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "precompute/eigen/verification.h"
-#include "precompute/modes/deformation_modes.h"
+#include "precompute/modes/mode_limits.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {

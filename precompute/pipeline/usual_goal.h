@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "precompute/modes/deformation_modes.h"
+#include "precompute/modes/solution_cost.h"
 #include "precompute/pipeline/resolution.h"
 
 namespace carillon::precompute {
