@@ -144,29 +144,34 @@ class MultifrontalCholesky<Real>::Substitution {
     for (int s = fronts_.supernode_count(); s-- > 0;) Backward(s, workers);
   }
 
+  /// Solves L y = x in the rows of front s. The triangle is solved in groups of tiles: a group
+  /// first subtracts the product with the columns solved before it, which threads share, and then
+  /// solves its own triangle, tile after tile.
   void Forward(int s, Rows& rows, Workers& workers) const {
     const int pivots = fronts_.pivot_count(s);
     Real* pivot = At(fronts_.first_pivot[s]);
     const int tiles = TileCount(pivots);
-    for (int first = 0; first < tiles; first += kGroup) {
-      const int last = std::min(tiles, first + kGroup);
-      const int solved = first * kTileRows;
-      Share(workers, solved * (last - first), last - first, [&](int begin, int end) {
-        std::array<Real, static_cast<size_t>(kNode)> scratch{};
-        for (int t = first + begin; t < first + end; ++t) {
-          Real* const at[2] = {PivotRow(pivot, t),
-                               SecondPivotRow(pivot, t, pivots, scratch.data())};
-          TileForward<Real, kWidth>(Triangle(s, t), solved, pivot, at);
-        }
-      });
-      for (int t = first; t < last; ++t) {
+    for (int first_tile = 0; first_tile < tiles; first_tile += kGroup) {
+      const int end_tile = std::min(tiles, first_tile + kGroup);
+      const int solved_columns = first_tile * kTileRows;
+      Share(workers, solved_columns * (end_tile - first_tile), end_tile - first_tile,
+            [&](int begin, int end) {
+              std::array<Real, static_cast<size_t>(kNode)> scratch{};
+              for (int t = first_tile + begin; t < first_tile + end; ++t) {
+                Real* const nodes[2] = {PivotRow(pivot, t),
+                                        SecondPivotRow(pivot, t, pivots, scratch.data())};
+                TileForward<Real, kWidth>(Triangle(s, t), solved_columns, pivot, nodes);
+              }
+            });
+      for (int t = first_tile; t < end_tile; ++t) {
         const int row = t * kTileRows;
-        const Real* tile = Triangle(s, t) + solved * kTileRows;
-        Real* const at[2] = {PivotRow(pivot, t),
-                             SecondPivotRow(pivot, t, pivots, rows.scratch.data())};
-        TileForward<Real, kWidth>(tile, row - solved, pivot + solved * kWidth, at);
-        WithTileRows<kWidth>(at[0], pivots - row, [&](Real* x6) {
-          TileSolve<Real, kWidth>(tile + (row - solved) * kTileRows, x6);
+        const Real* tile = Triangle(s, t) + solved_columns * kTileRows;
+        Real* const nodes[2] = {PivotRow(pivot, t),
+                                SecondPivotRow(pivot, t, pivots, rows.scratch.data())};
+        TileForward<Real, kWidth>(tile, row - solved_columns, pivot + solved_columns * kWidth,
+                                  nodes);
+        WithTileRows<kWidth>(nodes[0], pivots - row, [&](Real* x6) {
+          TileSolve<Real, kWidth>(tile + (row - solved_columns) * kTileRows, x6);
         });
       }
     }
@@ -174,14 +179,15 @@ class MultifrontalCholesky<Real>::Substitution {
     Share(workers, pivots, below, [&](int begin, int end) {
       std::array<Real, static_cast<size_t>(kNode)> scratch{};
       for (int t = begin; t < end; ++t) {
-        Real* at[2];
-        BelowRows(s, t, rows, scratch.data(), at);
-        TileForward<Real, kWidth>(Below(s, t), pivots, pivot, at);
+        Real* nodes[2];
+        BelowRows(s, t, rows, scratch.data(), nodes);
+        TileForward<Real, kWidth>(Below(s, t), pivots, pivot, nodes);
       }
     });
   }
 
-  /// Threads take different columns, because all tiles add to all columns.
+  /// Solves L^T y = x in the pivots of front s, in the reverse order. Threads take different
+  /// columns, because all tiles add to all columns.
   void Backward(int s, Workers& workers) const {
     const int pivots = fronts_.pivot_count(s);
     Real* pivot = At(fronts_.first_pivot[s]);
@@ -190,29 +196,31 @@ class MultifrontalCholesky<Real>::Substitution {
     Rows rows{.end = fronts_.node_count(), .above = nullptr, .scratch = {}};
     Share(workers, BelowCount(s) * kTileRows, pivots, [&](int begin, int end) {
       for (int t = 0; t < BelowCount(s); ++t) {
-        Real* at[2];
-        BelowRows(s, t, rows, zero.data(), at);
+        Real* nodes[2];
+        BelowRows(s, t, rows, zero.data(), nodes);
         TileBackward<Real, kWidth>(Below(s, t) + begin * kTileRows, end - begin,
-                                   pivot + begin * kWidth, at);
+                                   pivot + begin * kWidth, nodes);
       }
     });
-    for (int first = (tiles - 1) / kGroup * kGroup; first >= 0; first -= kGroup) {
-      const int last = std::min(tiles, first + kGroup);
-      const int left = first * kTileRows;
-      for (int t = last - 1; t >= first; --t) {
+    for (int first_tile = (tiles - 1) / kGroup * kGroup; first_tile >= 0; first_tile -= kGroup) {
+      const int end_tile = std::min(tiles, first_tile + kGroup);
+      const int columns_left = first_tile * kTileRows;
+      for (int t = end_tile - 1; t >= first_tile; --t) {
         const int row = t * kTileRows;
         const Real* tile = Triangle(s, t);
-        Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
-        WithTileRows<kWidth>(at[0], pivots - row, [&](Real* x6) {
+        Real* const nodes[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
+        WithTileRows<kWidth>(nodes[0], pivots - row, [&](Real* x6) {
           TileSolveTransposed<Real, kWidth>(tile + row * kTileRows, x6);
         });
-        TileBackward<Real, kWidth>(tile + left * kTileRows, row - left, pivot + left * kWidth, at);
+        TileBackward<Real, kWidth>(tile + columns_left * kTileRows, row - columns_left,
+                                   pivot + columns_left * kWidth, nodes);
       }
-      Share(workers, (last - first) * kTileRows, left, [&](int begin, int end) {
-        for (int t = first; t < last; ++t) {
-          Real* const at[2] = {PivotRow(pivot, t), SecondPivotRow(pivot, t, pivots, zero.data())};
+      Share(workers, (end_tile - first_tile) * kTileRows, columns_left, [&](int begin, int end) {
+        for (int t = first_tile; t < end_tile; ++t) {
+          Real* const nodes[2] = {PivotRow(pivot, t),
+                                  SecondPivotRow(pivot, t, pivots, zero.data())};
           TileBackward<Real, kWidth>(Triangle(s, t) + begin * kTileRows, end - begin,
-                                     pivot + begin * kWidth, at);
+                                     pivot + begin * kWidth, nodes);
         }
       });
     }
@@ -235,13 +243,14 @@ class MultifrontalCholesky<Real>::Substitution {
   }
   int BelowCount(int s) const { return TileCount(fronts_.update_count(s)); }
 
-  void BelowRows(int s, int tile, Rows& rows, Real* scratch, Real** at) const {
+  /// Sets `nodes` to the rows of the two nodes of a tile below the triangle.
+  void BelowRows(int s, int tile, Rows& rows, Real* scratch, Real** nodes) const {
     const int64_t first = fronts_.row_start[s] + fronts_.pivot_count(s) / 3 + 2 * tile;
     const auto find = [&](int node) {
       return node < rows.end ? At(node) : rows.above + factor_.top_index_[node] * kNode;
     };
-    at[0] = find(fronts_.rows[first]);
-    at[1] = first + 1 < fronts_.row_start[s + 1] ? find(fronts_.rows[first + 1]) : scratch;
+    nodes[0] = find(fronts_.rows[first]);
+    nodes[1] = first + 1 < fronts_.row_start[s + 1] ? find(fronts_.rows[first + 1]) : scratch;
   }
 
   /// Calls visit(begin, end) for parts of 0 ... n - 1, each of `work` numbers an item.

@@ -14,8 +14,19 @@
 namespace carillon::precompute {
 
 /// The factorization L L^T = K - shift M by the multifrontal method (Duff and Reid 1983), for
-/// solves of kBlockWidth right-hand sides at once. The panels of L are packed in tiles that one
-/// kernel streams through.
+/// solves of kBlockWidth right-hand sides at once. The panel of each front, its triangle of pivots
+/// with the rows of updates below, is packed in tiles of kTileRows rows, which are two nodes, in
+/// the order in which a solve reads them:
+///
+///     rows
+///     0- 5   [D0]                     D: a diagonal block, its diagonal inverted
+///     6-11   [T1 |D1]                 T: the columns left of it
+///     12-17  [T2     |D2]
+///     18-23  [T3         ]            rows of updates: all pivot columns
+///
+///     memory: D0 | T1 D1 | T2 D2 | T3     each tile: column 0 (kTileRows numbers), column 1, ...
+///
+/// A last tile with one node is filled up with zeros. docs/solver.md tells why.
 template <typename Real>
 class MultifrontalCholesky {
  public:
