@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-#include "precompute/sparse/node_matrix.h"
+#include "precompute/sparse/block_kernels.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/eigen/residual_kernels.cc"

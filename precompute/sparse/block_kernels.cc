@@ -5,8 +5,6 @@
 
 #include <type_traits>
 
-#include "precompute/sparse/node_matrix.h"
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/sparse/block_kernels.cc"
 // foreach_target.h includes this file once for each target, and must come first.

@@ -5,6 +5,9 @@
 
 namespace carillon::precompute {
 
+/// Number of vectors in a block of the solver: two AVX-512 registers of doubles for each row.
+inline constexpr int kBlockWidth = 16;
+
 /// Adds the product with column j of a NodeMatrix: y_i += B x_j and, off the diagonal, y_j += B^T
 /// x_i. The column has `count` blocks B (3x3, row-major) with their nodes in `rows`, the diagonal
 /// first. x and y have 3 rows for each node.

@@ -12,7 +12,7 @@
 
 #include <algorithm>
 
-#include "precompute/sparse/node_matrix.h"
+#include "precompute/sparse/block_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carillon::precompute::HWY_NAMESPACE {

@@ -9,9 +9,6 @@
 
 namespace carillon::precompute {
 
-/// Number of vectors in a block of the solver: two AVX-512 registers of doubles for each row.
-inline constexpr int kBlockWidth = 16;
-
 /// The Kronecker product m (x) I3 of a matrix m of nodes by nodes and the 3 by 3 identity. m is
 /// stored by rows with both triangles.
 template <typename Real>

@@ -3,7 +3,7 @@
 
 #include <hwy/cache_control.h>
 
-#include "precompute/sparse/node_matrix.h"
+#include "precompute/sparse/block_kernels.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "precompute/sparse/tile_kernels.cc"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "precompute/sparse/node_matrix.h"
+#include "precompute/sparse/block_kernels.h"
 
 namespace carillon::precompute {
 
