@@ -1,19 +1,20 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Finds locks that clang's thread-safety analysis or ThreadSanitizer does not see. The server takes those of
-server/base/mutex.h, the client absl::Mutex; precompute/, which shares only proto/ with them, keeps the standard's, and
-tests may take any."""
+server/base/mutex.h, precompute/, which shares only proto/ with it, those of precompute/sparse/mutex.h, and the client
+absl::Mutex; tests may take any."""
 
 import re
 
 import project
 
-THE_WRAPPERS = ("server/base/mutex.h", "server/base/recursive_mutex.h")
+THE_WRAPPERS = ("server/base/mutex.h", "server/base/recursive_mutex.h", "precompute/sparse/mutex.h")
 STANDARD = (r"\bstd::(?:\w*mutex|lock_guard|unique_lock|scoped_lock|shared_lock|condition_variable\w*)\b"
             r"|\bpthread_mutex_\w+")
 ABSEIL = r"\babsl::\w*Mutex\w*\b"
 # What each folder does not take, and what it takes instead.
 RULES = (("server/", re.compile(f"{STANDARD}|{ABSEIL}"), f"Mutex of {THE_WRAPPERS[0]}"),
+         ("precompute/", re.compile(f"{STANDARD}|{ABSEIL}"), f"Mutex of {THE_WRAPPERS[2]}"),
          ("client_sdk/", re.compile(STANDARD), "absl::Mutex"))
 
 

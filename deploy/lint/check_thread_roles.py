@@ -16,11 +16,12 @@ import compilation
 import project
 
 ROOMS = ("server/base/", "server/mode_database/", "server/decomposition/", "server/synthesis/", "server/audio_device/",
-         "server/live_output/", "server/scene/")
+         "server/live_output/", "server/scene/", "precompute/sparse/", "precompute/program/")
 # Compiled once for each SIMD target, and without a lock or a role: minutes for nothing.
 KERNELS = ("server/synthesis/ringing/force_kernel.cc", "server/synthesis/ringing/ring_kernel.cc",
            "server/synthesis/ringing/strike_kernel.cc", "server/synthesis/spectrum/spectral_kernel.cc",
-           "server/synthesis/voice/convolution_kernel.cc")
+           "server/synthesis/voice/convolution_kernel.cc", "precompute/sparse/block_kernels.cc",
+           "precompute/sparse/tile_kernels.cc")
 KEPT = ("-I", "-D", "-std")
 
 

@@ -22,14 +22,17 @@ double FractionByPhase(v1::Phase phase) {
 ProgressReporter::ProgressReporter(std::function<void(const v1::Progress&)> show,
                                    std::chrono::milliseconds interval)
     : show_(std::move(show)), interval_(interval) {
-  state_.set_phase(v1::PHASE_READ);
+  {
+    const MutexLock lock(mutex_);
+    state_.set_phase(v1::PHASE_READ);
+  }
   thread_ = std::thread([this] { Run(); });
 }
 
 ProgressReporter::~ProgressReporter() { Stop(); }
 
 void ProgressReporter::OnProgress(v1::Phase phase, double fraction) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (phase != state_.phase()) clock_.Enter(phase);
   state_.set_phase(phase);
   state_.set_fraction(std::max(state_.fraction(), FractionByPhase(phase)));
@@ -43,12 +46,12 @@ void ProgressReporter::OnProgress(v1::Phase phase, double fraction) {
 }
 
 void ProgressReporter::OnRound(const RoundForecast& forecast) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   remaining_.BeginRound(Now(), forecast);
 }
 
 void ProgressReporter::OnPlan(const std::vector<PlannedStep>& steps) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   remaining_.Plan(Now(), steps);
 }
 
@@ -65,47 +68,49 @@ void ProgressReporter::Estimate() {
 double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }
 
 void ProgressReporter::OnExtent(double extent_m) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   state_.set_extent_m(extent_m);
 }
 
 void ProgressReporter::OnMesh(size_t node_count) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   state_.set_node_count(static_cast<uint32_t>(node_count));
 }
 
 void ProgressReporter::OnModes(size_t mode_count) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   state_.set_converged_mode_count(static_cast<uint32_t>(mode_count));
 }
 
 void ProgressReporter::Stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_) return;
     stopping_ = true;
     clock_.Stop();
   }
-  wake_.notify_one();
+  wake_.NotifyOne();
   thread_.join();
 }
 
 v1::Progress ProgressReporter::state() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return state_;
 }
 
 void ProgressReporter::Run() {
-  std::unique_lock lock(mutex_);
-  while (true) {
-    Estimate();
-    const v1::Progress state = state_;
-    const bool last = stopping_;
-    lock.unlock();
+  for (bool last = false; !last;) {
+    v1::Progress state;
+    {
+      MutexLock lock(mutex_);
+      Estimate();
+      state = state_;
+      last = stopping_;
+    }
     show_(state);
-    if (last) return;
-    lock.lock();
-    wake_.wait_for(lock, interval_, [this] { return stopping_; });
+    MutexLock lock(mutex_);
+    // The end of the program need not wait for the next interval.
+    if (!last && !stopping_) wake_.WaitFor(lock, interval_);
   }
 }
 

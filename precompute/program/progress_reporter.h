@@ -2,15 +2,15 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <thread>
 
+#include "absl/base/thread_annotations.h"
 #include "precompute/pipeline/decomposition_observer.h"
 #include "precompute/pipeline/phase_clock.h"
 #include "precompute/program/remaining_time.h"
+#include "precompute/sparse/mutex.h"
 
 namespace carillon::precompute {
 
@@ -40,19 +40,19 @@ class ProgressReporter : public DecompositionObserver {
  private:
   void Run();
   double Now() const;
-  /// Updates the fraction and the remaining time. The caller has locked mutex_.
-  void Estimate();
+  /// Updates the fraction and the remaining time.
+  void Estimate() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   std::function<void(const v1::Progress&)> show_;
   std::chrono::milliseconds interval_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  v1::Progress state_;
-  bool stopping_ = false;
-  PhaseClock clock_;
-  double begun_s_ = PhaseClock::Now().seconds;
-  RemainingTime remaining_;
-  bool counted_ = false;  ///< whether the number of modes is known
+  mutable Mutex mutex_;
+  Condition wake_;
+  v1::Progress state_ ABSL_GUARDED_BY(mutex_);
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  PhaseClock clock_;  ///< changed under mutex_ until Stop, and constant afterwards
+  const double begun_s_ = PhaseClock::Now().seconds;
+  RemainingTime remaining_ ABSL_GUARDED_BY(mutex_);
+  bool counted_ ABSL_GUARDED_BY(mutex_) = false;  ///< whether the number of modes is known
   std::thread thread_;
 };
 

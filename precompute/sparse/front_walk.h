@@ -7,13 +7,13 @@
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "precompute/sparse/front_elimination.h"
 #include "precompute/sparse/frontal_structure.h"
+#include "precompute/sparse/mutex.h"
 #include "precompute/sparse/node_matrix.h"
 #include "precompute/sparse/workers.h"
 #include "proto/cpp/status_macros.h"
@@ -72,7 +72,7 @@ class FrontWalk {
   absl::Status RunSubtrees(const PartDone& progress) {
     std::atomic<size_t> next = 0;
     absl::Status failure;
-    std::mutex mutex;
+    Mutex mutex;
     const size_t stack_size = LargestStack();
     workers_.Run([&](int t) {
       Workers alone(1);
@@ -80,7 +80,7 @@ class FrontWalk {
       const std::unique_ptr<Real[]> stack(new Real[stack_size]);
       for (size_t i = next++; i < fronts_.subtrees.size(); i = next++) {
         const absl::Status status = RunSubtree(fronts_.subtrees[i], stack.get(), assembler, alone);
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         if (!status.ok()) failure = status;
         if (!failure.ok()) return;
         for (int s = fronts_.subtrees[i].begin; s < fronts_.subtrees[i].end; ++s) {

@@ -13,10 +13,10 @@ Workers::Workers(int count) {
 
 Workers::~Workers() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  begun_.notify_all();
+  begun_.NotifyAll();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -26,15 +26,15 @@ void Workers::Run(const std::function<void(int)>& work) {
     return;
   }
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     work_ = &work;
     busy_ = static_cast<int>(threads_.size());
     ++round_;
   }
-  begun_.notify_all();
+  begun_.NotifyAll();
   Try(work, 0);
-  std::unique_lock lock(mutex_);
-  ended_.wait(lock, [this] { return busy_ == 0; });
+  MutexLock lock(mutex_);
+  while (busy_ > 0) ended_.Wait(lock);
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
 }
 
@@ -42,7 +42,7 @@ void Workers::Try(const std::function<void(int)>& work, int index) {
   try {
     work(index);
   } catch (...) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     thrown_ = std::current_exception();
   }
 }
@@ -69,15 +69,15 @@ void Workers::Serve(int index) {
   while (true) {
     const std::function<void(int)>* work = nullptr;
     {
-      std::unique_lock lock(mutex_);
-      begun_.wait(lock, [&] { return stopping_ || round_ != seen; });
+      MutexLock lock(mutex_);
+      while (!stopping_ && round_ == seen) begun_.Wait(lock);
       if (stopping_) return;
       seen = round_;
       work = work_;
     }
     Try(*work, index);
-    const std::lock_guard lock(mutex_);
-    if (--busy_ == 0) ended_.notify_one();
+    const MutexLock lock(mutex_);
+    if (--busy_ == 0) ended_.NotifyOne();
   }
 }
 

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "precompute/sparse/mutex.h"
 
 namespace carillon::precompute {
 
@@ -37,14 +38,14 @@ class Workers {
   void Serve(int index);
   void Try(const std::function<void(int)>& work, int index);
 
-  std::mutex mutex_;
-  std::condition_variable begun_;
-  std::condition_variable ended_;
-  const std::function<void(int)>* work_ = nullptr;
-  uint64_t round_ = 0;
-  int busy_ = 0;
-  bool stopping_ = false;
-  std::exception_ptr thrown_;
+  Mutex mutex_;
+  Condition begun_;
+  Condition ended_;
+  const std::function<void(int)>* work_ ABSL_GUARDED_BY(mutex_) = nullptr;
+  uint64_t round_ ABSL_GUARDED_BY(mutex_) = 0;
+  int busy_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  std::exception_ptr thrown_ ABSL_GUARDED_BY(mutex_);
   std::vector<std::thread> threads_;
 };
 

@@ -25,8 +25,12 @@ class Locks(TreeTest):
         self.write("client_sdk/cpp/a.cc", "absl::Mutex a;\n")
         self.assert_found(check_locks.check(self.root))
 
-    def test_precompute_and_tests_may_use_the_standards(self):
-        self.write("precompute/sparse/a.cc", "std::mutex a;\n")
+    def test_the_worker_has_a_wrapper_of_its_own(self):
+        self.write("precompute/sparse/mutex.h", "std::mutex mutex_;\n")
+        self.write("precompute/sparse/a.cc", "Mutex a;\nstd::mutex b;\n")
+        self.assert_found(check_locks.check(self.root), "precompute/sparse/a.cc:2")
+
+    def test_tests_may_use_the_standards(self):
         self.write("tests/server/a.cc", "std::mutex a;\n")
         self.assert_found(check_locks.check(self.root))
 
