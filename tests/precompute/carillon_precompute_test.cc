@@ -88,6 +88,13 @@ TEST_F(CarillonPrecomputeTest, ARequestFileAndFlagsMakeTheSameModel) {
   EXPECT_EQ(by_request[0].header().settings().mass_matrix(), v1::MASS_MATRIX_LUMPED);
 }
 
+TEST_F(CarillonPrecomputeTest, ComputesAlsoIfItsParentIgnoresSigchld) {
+  const std::string command = std::string("trap '' CHLD; exec ") + CARILLON_PRECOMPUTE + " " + bar +
+                              " --out " + model + " --unit mm --nodes 100 --repair" + kSteel +
+                              " >" + folder + "/stdout 2>" + folder + "/stderr";
+  EXPECT_EQ(std::system(command.c_str()), 0) << OnStandardError();
+}
+
 TEST_F(CarillonPrecomputeTest, ARequestFileIsCheckedAndReplacesTheFlags) {
   const std::string request = folder + "/request";
   const auto reason = [&](const std::string& text, const std::string& more = "") {

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/pipeline/model_checks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "precompute/pipeline/model_warnings.h"
+#include "precompute/pipeline/usual_goal.h"
+#include "tests/precompute/test_meshes.h"
+
+namespace carillon::precompute {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// Steel at the size of its mesh, from 100 to 1000 Hz.
+constexpr double kLowHz = 100, kHighHz = 1000;
+IntendedUse Use() {
+  return {.young_pa = 210e9, .density_kg_per_m3 = 7850, .low_hz = kLowHz, .high_hz = kHighHz};
+}
+
+/// A model with modes of these frequencies and estimated errors, whose shapes tell them apart.
+ModalModel ModelWith(const std::vector<double>& frequencies_hz, const std::vector<double>& errors) {
+  ModalModel model;
+  model.vertices = {{0, 0, 0}};
+  for (const double hz : frequencies_hz) model.eigenvalues.push_back(Use().UnitEigenvalue(hz));
+  model.estimated_errors = errors;
+  model.residuals.assign(errors.size(), 0);
+  model.couplings.assign(errors.size(), 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t m = 0; m < errors.size(); ++m) {
+      model.shapes.push_back(static_cast<float>(10 * m) + static_cast<float>(axis));
+    }
+  }
+  model.lowest_eigenvalue = model.eigenvalues.empty() ? 0 : model.eigenvalues[0];
+  model.complete_to_eigenvalue = Use().UnitEigenvalue(kHighHz);
+  return model;
+}
+
+TEST(CheckBand, AModeMustLieAtTheLowerEndOfTheBandOrAbove) {
+  EXPECT_TRUE(CheckBand(ModelWith({50, kLowHz * 1.001}, {0, 0}), Use()).ok());
+  const absl::Status refused = CheckBand(ModelWith({50, 90}, {0, 0}), Use());
+  EXPECT_THAT(refused.ToString(), HasSubstr("NO_MODE_IN_BAND"));
+  EXPECT_THAT(refused.ToString(),
+              HasSubstr("its first is 50 Hz and the last below the band is 90"));
+}
+
+TEST(IsSurelyAboveBand, TheLowestModeMustLieAboveByMoreThanTwiceItsError) {
+  ModalModel model = ModelWith({}, {});
+  model.lowest_error = 0.1;
+  model.lowest_eigenvalue = Use().UnitEigenvalue(kHighHz * 1.19);
+  EXPECT_FALSE(IsSurelyAboveBand(model, Use()));
+  model.lowest_eigenvalue = Use().UnitEigenvalue(kHighHz * 1.21);
+  EXPECT_TRUE(IsSurelyAboveBand(model, Use()));
+  EXPECT_FALSE(IsSurelyAboveBand(ModelWith({2 * kHighHz}, {0}), Use())) << "it has a mode";
+}
+
+TEST(MayBeTooSmall, ACubeOfAMillimetreMayBeAndOneOfAMetreMayNot) {
+  EXPECT_TRUE(MayBeTooSmall(MakeBoxSurface({1e-3, 1e-3, 1e-3}), Use()));
+  EXPECT_FALSE(MayBeTooSmall(MakeBoxSurface({1, 1, 1}), Use()));
+  EXPECT_FALSE(MayBeTooSmall(MakeBoxSurface({1e-3, 1e-3, 1e-6}), Use())) << "it is no compact body";
+}
+
+TEST(LeaveOutInaccurate, TheKeptModesAreThoseWithinTheLimitAndTheModelEndsBelowTheOthers) {
+  ModalModel model = ModelWith({200, 300, 400}, {0.01, 0.05, 0.02});
+  ASSERT_TRUE(LeaveOutInaccurate(0.03, Use(), model).ok());
+  EXPECT_THAT(model.eigenvalues, ElementsAre(Use().UnitEigenvalue(200), Use().UnitEigenvalue(400)));
+  EXPECT_THAT(model.estimated_errors, ElementsAre(0.01, 0.02));
+  EXPECT_THAT(model.shapes, ElementsAre(0, 20, 1, 21, 2, 22));
+  EXPECT_EQ(model.complete_to_eigenvalue, std::nextafter(Use().UnitEigenvalue(300), 0));
+  ASSERT_EQ(model.warnings.size(), 1U);
+  EXPECT_THAT(model.warnings[0], HasSubstr("1 modes, the lowest at 300 Hz, were left out"));
+}
+
+TEST(LeaveOutInaccurate, WithoutALimitAllModesAreKeptAndNoneCanBeLeft) {
+  ModalModel model = ModelWith({200, 300}, {0.5, 0.6});
+  ASSERT_TRUE(LeaveOutInaccurate(0, Use(), model).ok());
+  EXPECT_EQ(model.eigenvalues.size(), 2U);
+  EXPECT_THAT(LeaveOutInaccurate(0.4, Use(), model).ToString(), HasSubstr("ACCURACY_NOT_REACHED"));
+}
+
+TEST(ModelWarnings, OnlyErrorsAboveTheGreatOneAreWarnedOf) {
+  ModalModel model = ModelWith({200, 300}, {kGreatError, kGreatError});
+  WarnOfGreatErrors(model);
+  EXPECT_THAT(model.warnings, IsEmpty());
+  model.estimated_errors[1] = 1.01 * kGreatError;
+  WarnOfGreatErrors(model);
+  ASSERT_EQ(model.warnings.size(), 1U);
+  EXPECT_THAT(model.warnings[0], HasSubstr("frequencies of 1 of 2 modes"));
+}
+
+TEST(ModelWarnings, AnAccuracyIsWarnedOfOnlyWhereItWasMissed) {
+  ModalModel model = ModelWith({200}, {0.02});
+  WarnOfAccuracy({.accuracy = 0.02}, model);
+  WarnOfAccuracy({.budget_s = 1}, model);
+  EXPECT_THAT(model.warnings, IsEmpty());
+  WarnOfAccuracy({.accuracy = 0.01}, model);
+  EXPECT_EQ(model.warnings.size(), 1U);
+}
+
+}  // namespace
+}  // namespace carillon::precompute
