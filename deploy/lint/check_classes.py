@@ -12,7 +12,7 @@ import project
 CLASS = re.compile(r"^ *(?:template <[^;{]*> *)?(?:class|struct)(?: [A-Z_]+(?:\([^)]*\))?)? (\w+)[^;(]*{", re.M)
 MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?:\w+::)*~?\w+\(", re.M)
 APART = {
-    "server/decomposition/job_cancellation.cc", "server/mode_database/model_collection.cc",
+    "server/mode_database/model_collection.cc",
     "server/synthesis/bank/oscillator_bank_setup.cc",
     "server/synthesis/bank/oscillator_bank_strikes.cc",
     "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
