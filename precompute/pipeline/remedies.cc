@@ -30,7 +30,7 @@ struct Refused {
 };
 
 /// Returns a value with two digits, or an empty string, which leaves the choice to the caller.
-std::string Rounded(double value) {
+std::string InTwoDigits(double value) {
   return std::isfinite(value) && value > 0 ? absl::StrFormat("%.2g", value) : "";
 }
 
@@ -44,7 +44,7 @@ std::string RoundedWhole(double value) {
 /// The lower end of the band that an option with the upper end alone means.
 constexpr double kUsualLowestHz = 20;
 
-double HighestHz(const v1::WorkerRequest& request) { return UseOf(request).high_hz; }
+double TopOfBandHz(const v1::WorkerRequest& request) { return UseOf(request).high_hz; }
 
 /// Returns a band's upper end with two digits, at most as high as given.
 std::string RoundedDown(double value) {
@@ -66,7 +66,7 @@ constexpr double kFirstBudget = 120;
 /// Returns the size with which the first mode lies in the band, or an empty string if rounding it
 /// moves the mode out of a narrow band.
 std::string SizeInBand(const Refused& refused) {
-  const double low_hz = refused.request.min_frequency_hz(), high_hz = HighestHz(refused.request);
+  const double low_hz = refused.request.min_frequency_hz(), high_hz = TopOfBandHz(refused.request);
   const double usual_hz = std::min(kAudibleHz, high_hz / 2);
   const double wanted_hz = usual_hz > low_hz ? usual_hz : std::sqrt(low_hz * high_hz);
   const double at_size_one = SizeOf(refused.request) * refused.Figure("first_mode_hz");
@@ -119,20 +119,22 @@ constexpr Known kRepair{"settings.mesh.repair", "--repair",
 constexpr Known kWall{
     "settings.mesh.wall_m", "--wall",
     "makes a body of an open sheet by a wall of this thickness in metres",
-    [](const Refused& refused) { return Rounded(kWallPart * refused.Figure("extent_m")); },
+    [](const Refused& refused) { return InTwoDigits(kWallPart * refused.Figure("extent_m")); },
     [](const Refused& r) {
       return r.request.settings().mesh().wall_m() > 0 || r.Figure("wall_helps", 1) == 0;
     }};
-constexpr Known kThinnerWall{
-    "settings.mesh.wall_m", "--wall", "asks for a wall of half the thickness, in metres",
-    [](const Refused& refused) { return Rounded(refused.request.settings().mesh().wall_m() / 2); },
-    Never};
+constexpr Known kThinnerWall{"settings.mesh.wall_m", "--wall",
+                             "asks for a wall of half the thickness, in metres",
+                             [](const Refused& refused) {
+                               return InTwoDigits(refused.request.settings().mesh().wall_m() / 2);
+                             },
+                             Never};
 constexpr Known kSolid{"settings.mesh.wall_m", "--wall", "fills the body without a wall",
                        [](const Refused&) -> std::string { return "0"; },
                        [](const Refused& r) { return r.Figure("open") > 0; }};
 constexpr Known kBand{
     "max_frequency_hz", "--band", "leaves out the modes of the band's upper half",
-    [](const Refused& refused) { return RoundedWhole(HighestHz(refused.request) / 2); }, Never};
+    [](const Refused& refused) { return RoundedWhole(TopOfBandHz(refused.request) / 2); }, Never};
 constexpr Known kOpenBand{"max_frequency_hz", "--band",
                           "computes as many of the lowest modes as fit",
                           [](const Refused&) -> std::string { return "0"; },
