@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/sparse/node_ordering.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include <numeric>
 #include <vector>
 
-#include "precompute/sparse/node_ordering.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
