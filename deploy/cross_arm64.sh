@@ -32,7 +32,7 @@ while read -r name; do
     *) packages+=("$name") ;;
   esac
 done < <(sed -e 's/#.*//' -e '/^ *$/d' "$root"/deploy/packages/{programs,tests}.txt |
-  grep -vE '^(python3|mypy|slurm|munge|glmark2|assimp-utils|jack|fish|zsh|groff)')
+  grep -vE '^(python3|mypy|slurm|munge|glmark2|assimp-utils|jack)')
 apt-get -q -y install --no-install-recommends "${packages[@]}"
 
 cd "$root"

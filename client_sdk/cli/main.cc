@@ -16,26 +16,25 @@
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
-#include "client_sdk/cli/commands.h"
-#include "client_sdk/cli/completion_options.h"
-#include "client_sdk/cli/doctor_command.h"
-#include "client_sdk/cli/list_options.h"
-#include "client_sdk/cli/material_options.h"
-#include "client_sdk/cli/model_options.h"
-#include "client_sdk/cli/name_options.h"
-#include "client_sdk/cli/output.h"
-#include "client_sdk/cli/program.h"
-#include "client_sdk/cli/render_options.h"
-#include "client_sdk/cli/sound_options.h"
-#include "client_sdk/cli/value_options.h"
-#include "proto/cpp/program/manual_page.h"
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/commands/doctor_command.h"
+#include "client_sdk/cli/commands/program.h"
+#include "client_sdk/cli/options/list_options.h"
+#include "client_sdk/cli/options/material_options.h"
+#include "client_sdk/cli/options/model_options.h"
+#include "client_sdk/cli/options/render_options.h"
+#include "client_sdk/cli/options/sound_options.h"
+#include "client_sdk/cli/options/unknown_word.h"
+#include "client_sdk/cli/options/value_options.h"
+#include "client_sdk/cli/output/output.h"
 #include "proto/cpp/striker_catalogue.h"
 
 namespace carillon::cli {
 namespace {
 
 void AddStatus(CLI::App& app, Program& program) {
-  app.add_subcommand("status", "Show the audio device, the mixer and the load of the daemon")
+  app.add_subcommand("status",
+                     "Show the audio device, the mixer, the load and the limits of the daemon")
       ->callback([&] {
         program.command = [&] {
           return ShowStatus(*program.Daemon(), program.server, program.json);
@@ -47,13 +46,6 @@ void AddHealth(CLI::App& app, Program& program) {
   app.add_subcommand("health", "Show which services of the daemon are SERVING")->callback([&] {
     program.command = [&] { return ShowHealth(*program.Daemon(), program.json); };
   });
-}
-
-void AddInfo(CLI::App& app, Program& program) {
-  app.add_subcommand("info", "Show the version, the limits and the features of the daemon")
-      ->callback([&] {
-        program.command = [&] { return ShowInfo(*program.Daemon(), program.server, program.json); };
-      });
 }
 
 void AddCollect(CLI::App& db, Program& program) {
@@ -106,10 +98,8 @@ void AddDatabase(CLI::App& app, Program& program) {
 
 void AddTransfer(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateTransferOptions>();
-  CLI::App& transfer = *app.add_subcommand("transfer", "Compute how the modes of models radiate")
-                            ->require_subcommand(1);
-  CLI::App& create = *transfer.add_subcommand(
-      "create", "Compute the radiation of a stored model for a material, and store it");
+  CLI::App& create = *app.add_subcommand(
+      "transfer", "Compute the radiation of a stored model for a material, and store it");
   create
       .add_option("model", options->model,
                   "The name, the label, or the first digits of the digest of a model")
@@ -132,7 +122,7 @@ void AddTransfer(CLI::App& app, Program& program) {
 
 void AddDoctor(CLI::App& app, Program& program) {
   CLI::App& doctor = *app.add_subcommand(
-      "doctor", "Look at the daemon and this machine, and say what is wrong and what to do");
+      "doctor", "Check the settings and the health of the daemon, and say what to do");
   doctor.callback([&program] { program.command = [&program] { return Diagnose(program); }; });
 }
 
@@ -250,7 +240,7 @@ void AddProgramOptions(CLI::App& app, Program& program) {
       ->check(CLI::ExistingFile);
   app.add_flag("--json", program.json, "Print the results as JSON");
   app.set_version_flag("--version", "carillon " CARILLON_VERSION);
-  AddManualFlag(app, 1, CARILLON_VERSION);
+  app.set_help_all_flag("--help-all", "Print the help of all commands and exit");
   app.require_subcommand(1)->fallthrough();
   app.footer(
       "Exit codes: 0 for success; 1 if the command fails, and stderr says why; 2 if the "
@@ -266,24 +256,7 @@ const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
   return chosen.empty() ? nullptr : FindOption(*chosen.front(), name);
 }
 
-bool HasOptionFor(const CLI::App& app, const std::string& option) {
-  return FindOption(app, option) != nullptr;
-}
-
-/// Adds the command `help`, for the list of commands; see WithHelpOption.
-void AddHelp(CLI::App& app, Program& program) {
-  CLI::App& help = *app.add_subcommand("help", "Show the help of the program or of a command");
-  help.add_option("command", "The command, such as model create");
-  help.callback([&app, &program] {
-    program.command = [&app] {
-      absl::PrintF("%s", app.help());
-      return absl::OkStatus();
-    };
-  });
-}
-
 void AddCommands(CLI::App& app, Program& program) {
-  AddInfo(app, program);
   AddStatus(app, program);
   AddHealth(app, program);
   AddDoctor(app, program);
@@ -298,21 +271,7 @@ void AddCommands(CLI::App& app, Program& program) {
   AddRender(app, program);
   AddVolume(app, program);
   AddStop(app, program);
-  AddTop(app, program);
   AddExample(app, program);
-  AddCompletion(app, program);
-  AddNames(app, program);
-  AddHelp(app, program);
-}
-
-/// Returns the words of the command line, with `carillon help COMMAND` as `carillon COMMAND
-/// --help`.
-std::vector<const char*> WithHelpOption(int argc, char** argv) {
-  std::vector<const char*> words(argv, argv + argc);
-  if (argc < 2 || absl::string_view(argv[1]) != "help") return words;
-  words.erase(words.begin() + 1);
-  words.push_back("--help");
-  return words;
 }
 
 /// Adds the names of the required options that the chosen commands lack.
@@ -339,7 +298,8 @@ std::string ConversionText(const CLI::App& app, const CLI::ParseError& error) {
 std::string NextCommands(const CLI::App& app) {
   const CLI::App* last = &app;
   while (!last->get_subcommands().empty()) last = last->get_subcommands().back();
-  const std::vector<const CLI::App*> commands = ListedCommands(*last);
+  const std::vector<const CLI::App*> commands =
+      last->get_subcommands([](const CLI::App* /*command*/) { return true; });
   const auto name = [](std::string* text, const CLI::App* command) {
     absl::StrAppend(text, command->get_name());
   };
@@ -363,7 +323,7 @@ std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
 }
 
 /// Returns the exit code of a command that ended with `code`, once its output is written.
-int Finish(int code) { return code == kDone ? Report(FlushOutput(), HasEveryOption) : code; }
+int Finish(int code) { return code == kDone ? Report(FlushOutput()) : code; }
 
 int Main(int argc, char** argv) {
   OpenStandardStreams();
@@ -372,12 +332,10 @@ int Main(int argc, char** argv) {
                "carillon");
   AddProgramOptions(app, program);
   AddCommands(app, program);
-  const std::vector<const char*> words = WithHelpOption(argc, argv);
-  const auto count = static_cast<int>(words.size());
   try {
-    app.parse(count, words.data());
+    app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    const std::string unknown = UnknownWord(app, count, words.data());
+    const std::string unknown = UnknownWord(app, argc, argv);
     if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
     std::cerr << "carillon: " << (unknown.empty() ? MistakeText(app, error) : unknown) << '\n';
     return kUsage;
@@ -387,8 +345,7 @@ int Main(int argc, char** argv) {
               << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
     return kUsage;
   }
-  const auto has_option = [&](const std::string& option) { return HasOptionFor(app, option); };
-  return Finish(Report(program.command(), has_option));
+  return Finish(Report(program.command()));
 }
 
 }  // namespace

@@ -31,18 +31,9 @@ install(DIRECTORY proto/carillon DESTINATION ${CMAKE_INSTALL_DATADIR}/carillon/p
 
 if(CARILLON_CLI)
   install(TARGETS carillon RUNTIME COMPONENT cli)
-  install(FILES ${CMAKE_BINARY_DIR}/man/carillon.1 TYPE MAN RENAME man1/carillon.1 COMPONENT cli)
-  set(completion ${CMAKE_BINARY_DIR}/completion)
-  install(FILES ${completion}/carillon.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
-          RENAME carillon COMPONENT cli)
-  install(FILES ${completion}/carillon.zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions
-          RENAME _carillon COMPONENT cli)
-  install(FILES ${completion}/carillon.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
-          COMPONENT cli)
 endif()
 if(CARILLON_SERVER)
   install(TARGETS carillond carillon-audio RUNTIME COMPONENT server)
-  install(FILES ${CMAKE_BINARY_DIR}/man/carillond.8 TYPE MAN RENAME man8/carillond.8 COMPONENT server)
   install(FILES deploy/systemd/carillond.service DESTINATION lib/systemd/system COMPONENT server)
   install(FILES deploy/prometheus/alerts.yml deploy/prometheus/grafana_dashboard.json
           DESTINATION ${CMAKE_INSTALL_DATADIR}/carillon/prometheus COMPONENT server)
@@ -50,8 +41,6 @@ if(CARILLON_SERVER)
 endif()
 if(CARILLON_PRECOMPUTE)
   install(TARGETS carillon-precompute RUNTIME COMPONENT precompute)
-  install(FILES ${CMAKE_BINARY_DIR}/man/carillon-precompute.1 TYPE MAN RENAME man1/carillon-precompute.1
-          COMPONENT precompute)
   install(FILES precompute/LICENSE TYPE DOC RENAME LICENSE.AGPL-3.0 COMPONENT precompute)
 endif()
 install(FILES README.md ARCHITECTURE.md CHANGELOG.md LICENSE TYPE DOC COMPONENT doc)

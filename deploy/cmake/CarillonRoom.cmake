@@ -53,23 +53,6 @@ function(carillon_program name)
   endif()
 endfunction()
 
-# carillon_output(carillon completion/carillon.fish completion fish)
-#
-# A file in the build folder with what a program prints when it is called with these arguments; written whenever the
-# program is linked. A program with a sanitizer is not installed and need not write any.
-function(carillon_output program file)
-  cmake_path(GET file PARENT_PATH folder)
-  file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/${folder})
-  if(NOT CARILLON_SANITIZE)
-    add_custom_command(TARGET ${program} POST_BUILD COMMAND ${program} ${ARGN} > ${CMAKE_BINARY_DIR}/${file} VERBATIM)
-  endif()
-endfunction()
-
-# carillon_manual(carillond 8): the manual page man/carillond.8, which the program prints itself.
-function(carillon_manual program section)
-  carillon_output(${program} man/${program}.${section} --man)
-endfunction()
-
 # carillon_needs(server/synthesis/mixer_test carillond ...)
 #
 # What the tests of a folder need: tests_server_synthesis and tests_server build the targets given. deploy/test.sh

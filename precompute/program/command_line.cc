@@ -19,7 +19,6 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_file.h"
-#include "proto/cpp/program/manual_page.h"
 #include "proto/cpp/program/settings_options.h"
 #include "proto/cpp/status_macros.h"
 
@@ -297,9 +296,6 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv) 
   CLI::App app("Computes the vibration modes of a body from its surface or tetrahedra.",
                "carillon-precompute");
   app.set_version_flag("--version", CARILLON_VERSION);
-  app.add_flag_callback(
-         "--man", [] { throw CLI::Success(); }, "Print the manual page")
-      ->group("");
   Options options;
   CommandLine result;
   AddOptions(app, options, result);
@@ -313,10 +309,6 @@ absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv) 
     CommandLine version;
     version.message = absl::StrCat(CARILLON_VERSION, "\n");
     return version;
-  } catch (const CLI::Success&) {
-    CommandLine manual;
-    manual.message = ManualPage(app, 1, CARILLON_VERSION);
-    return manual;
   } catch (const CLI::Error& error) {
     return InvalidOption(
         absl::StrCat(error.what(), "; carillon-precompute --help lists the options"));

@@ -51,10 +51,12 @@ bool IsServerAddress(const std::string& text) {
 }
 
 bool IsOnThisMachine(const std::string& address) {
-  for (const char* prefix : {"unix:", "localhost:", "127.", "[::1]:"}) {
-    if (address.rfind(prefix, 0) == 0) return true;
+  for (const char* prefix : {"unix:", "localhost:", "[::1]:"}) {
+    if (address.starts_with(prefix)) return true;
   }
-  return false;
+  // A name such as 127.example.org may be that of any machine.
+  return address.starts_with("127.") &&
+         address.find_first_not_of("0123456789.:") == std::string::npos;
 }
 
 }  // namespace carillon

@@ -15,7 +15,6 @@
 #include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/program/manual_page.h"
 #include "proto/cpp/server_address.h"
 #include "proto/cpp/status_macros.h"
 #include "server/daemon/setting_rules.h"
@@ -291,7 +290,6 @@ std::optional<int> ParseFlags(int argc, const char* const* argv, const std::stri
   app.add_option("--config", configuration,
                  "TOML file whose keys are the flags, with _ in place of - "
                  "[carillond.toml in $CONFIGURATION_DIRECTORY]");
-  AddManualFlag(app, 8, version);
   AddFlags(app, command.options);
   RefuseWordsForNumbers(app);
   AddDatabaseCommands(app, command);

@@ -40,7 +40,7 @@ class ContactStreamCall final
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
   ContactStreamCall(std::string server, const std::string& token) : server_(std::move(server)) {
-    Authorize(context_, token);
+    Authorize(context_, server_, token);
   }
 
   ~ContactStreamCall() override {

@@ -4,6 +4,7 @@
 #include <grpcpp/client_context.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
+#include <grpcpp/support/channel_arguments.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -13,6 +14,7 @@
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/contact_stream_call.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
+#include "proto/cpp/server_address.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
@@ -26,7 +28,7 @@ absl::StatusOr<Response> Call(const Stubs& stubs, Stub& stub,
                               const Request& request) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  Authorize(context, stubs.token);
+  Authorize(context, stubs.server, stubs.token);
   Response response;
   RETURN_IF_ERROR(FromRpc((stub.*method)(&context, request, &response), stubs.server));
   return response;
@@ -47,6 +49,15 @@ std::string TokenOf(const ConnectOptions& options) {
   return token == nullptr ? "" : token;
 }
 
+/// Returns a channel to the daemon. $http_proxy is for other machines: a proxy could not reach this
+/// one's loopback addresses.
+std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
+                                           const ConnectOptions& options) {
+  grpc::ChannelArguments arguments;
+  if (IsOnThisMachine(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return grpc::CreateCustomChannel(server, CredentialsFor(options), arguments);
+}
+
 template <class Request>
 Request Named(const std::string& name) {
   Request request;
@@ -57,8 +68,7 @@ Request Named(const std::string& name) {
 }  // namespace
 
 GrpcClient::GrpcClient(const std::string& server, const ConnectOptions& options)
-    : stubs_(std::make_unique<Stubs>(server, TokenOf(options),
-                                     grpc::CreateChannel(server, CredentialsFor(options)))) {}
+    : stubs_(std::make_unique<Stubs>(server, TokenOf(options), OpenChannel(server, options))) {}
 
 absl::StatusOr<v1::GetServerInfoResponse> GrpcClient::GetServerInfo() const {
   return Call(*stubs_, stubs_->info, &v1::ServerService::Stub::GetServerInfo,

@@ -17,7 +17,7 @@
 namespace carillon::client {
 absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   v1::ExportModalModelRequest request;
   request.set_name(name);
   request.set_transfers(true);
@@ -34,7 +34,7 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
     const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
     const std::string& label) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   v1::ImportModalModelResponse response;
   const auto writer = stubs_->models.ImportModalModel(&context, &response);
   v1::ImportModalModelRequest request;
@@ -58,7 +58,7 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
 
 absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   v1::GetDatabaseStatsResponse response;
   RETURN_IF_ERROR(FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server));
@@ -68,7 +68,7 @@ absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() cons
 absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
   ASSIGN_OR_RETURN(WholeFile copy, WholeFile::Create(file));
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   const auto reader = stubs_->admin.BackUpDatabase(&context, {});
   v1::BackUpDatabaseResponse response;
   uint64_t byte_count = 0;
@@ -92,7 +92,7 @@ absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
 absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(
     const v1::CollectGarbageRequest& request) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
   v1::CollectGarbageResponse response;
   RETURN_IF_ERROR(

@@ -24,7 +24,7 @@ absl::Status GrpcClient::FetchMesh(const JobRun& run, const std::string& file) c
   std::ofstream out(file, std::ios::binary);
   if (!out) return NotWritable(file);
   grpc::ClientContext context;
-  Authorize(context, run.token);
+  Authorize(context, stubs_->server, run.token);
   v1::FetchMeshRequest request;
   request.set_job(run.job);
   const auto reader = stubs_->job_runs.FetchMesh(&context, request);
@@ -39,7 +39,7 @@ absl::Status GrpcClient::FetchMesh(const JobRun& run, const std::string& file) c
 absl::Status GrpcClient::ReportProgress(const JobRun& run, const v1::Progress& progress) const {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kReportTimeout);
-  Authorize(context, run.token);
+  Authorize(context, stubs_->server, run.token);
   v1::ReportProgressRequest request;
   request.set_job(run.job);
   *request.mutable_progress() = progress;
@@ -50,7 +50,7 @@ absl::Status GrpcClient::ReportProgress(const JobRun& run, const v1::Progress& p
 absl::Status GrpcClient::UploadResult(const JobRun& run, const v1::RunEnd& end,
                                       const std::string& model_file) const {
   grpc::ClientContext context;
-  Authorize(context, run.token);
+  Authorize(context, stubs_->server, run.token);
   v1::UploadResultResponse response;
   const auto writer = stubs_->job_runs.UploadResult(&context, &response);
   v1::UploadResultRequest request;

@@ -124,7 +124,7 @@ Rendering ReceiveSound(const AudioCallback& on_block, const BlowCallback& on_blo
 
 absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   v1::UploadMeshResponse response;
   const auto writer = stubs_->models.UploadMesh(&context, &response);
   v1::UploadMeshRequest request;
@@ -140,7 +140,7 @@ absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) cons
 absl::StatusOr<v1::Job> GrpcClient::WatchJob(
     const std::string& name, const std::function<void(const v1::Job&)>& on_change) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   v1::WatchJobRequest request;
   request.set_name(name);
   const auto reader = stubs_->decompositions.WatchJob(&context, request);
@@ -165,7 +165,7 @@ absl::Status GrpcClient::WatchJobs(
     const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const {
   RETURN_IF_ERROR(CheckCallback(on_answer, "on_answer"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   const auto reader = stubs_->decompositions.WatchJobs(&context, request);
   v1::WatchJobsResponse answer;
   bool stopped = false;
@@ -184,7 +184,7 @@ absl::Status GrpcClient::RecordContacts(
     const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const {
   RETURN_IF_ERROR(CheckCallback(on_record, "on_record"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   v1::RecordContactsRequest request;
   request.set_scene(scene);
   const auto stream = stubs_->contacts.RecordContacts(&context, request);
@@ -206,7 +206,7 @@ absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
                                   const AudioCallback& on_block) const {
   RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   const auto stream = stubs_->audio.Listen(&context, request);
   BlockReader reader;
   v1::ListenResponse response;
@@ -233,7 +233,7 @@ absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& s
                                                      const BlowCallback& on_blow) const {
   RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->token);
+  Authorize(context, stubs_->server, stubs_->token);
   const auto call = stubs_->audio.Render(&context);
   // A second thread sends, because the daemon may send sound before it has the whole trace.
   absl::Status sent;

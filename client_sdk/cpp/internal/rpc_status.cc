@@ -46,6 +46,14 @@ absl::Status FromRpc(const grpc::Status& status, const std::string& server) {
   if (code == absl::StatusCode::kUnavailable) {
     return Refusal(code, "SERVER_UNAVAILABLE", WhyUnavailable(status.error_message(), server));
   }
+  // gRPC gives this text to a call with a token on a connection that is not encrypted.
+  if (code == absl::StatusCode::kUnauthenticated &&
+      absl::StrContains(status.error_message(), "sufficient security level")) {
+    return Refusal(absl::StatusCode::kFailedPrecondition, "TLS_REQUIRED",
+                   absl::StrCat("the network could read the token on its way to ", server,
+                                ", so that it was not sent: give the roots that vouch for the "
+                                "daemon's certificate (--tls-roots), or no token"));
+  }
   if (code == absl::StatusCode::kDeadlineExceeded) {
     return Refusal(code, "SERVER_TIMEOUT",
                    absl::StrCat(server, " took too long to answer; try again later"));

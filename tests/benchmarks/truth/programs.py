@@ -134,7 +134,7 @@ class Studio:
         if not knows("contact_trace", "ContactTraceObject", "radiation"):
             return False
         figures = ["--young", material["young_pa"], "--density", material["density_kg_per_m3"], "--loss-factor", 1e-3]
-        self.command("transfer", "create", model.split("/")[-1], *figures, *options, "--wait")
+        self.command("transfer", model.split("/")[-1], *figures, *options, "--wait")
         return True
 
     def export(self, model):

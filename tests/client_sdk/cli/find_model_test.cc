@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/find_model.h"
+#include "client_sdk/cli/commands/find_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/job_progress.h"
+#include "client_sdk/cli/output/job_progress.h"
 
 #include <gtest/gtest.h>
 

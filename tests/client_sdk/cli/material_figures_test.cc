@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/material_figures.h"
+#include "client_sdk/cli/commands/material_figures.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/output.h"
+#include "client_sdk/cli/output/output.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/quantity.h"
+#include "client_sdk/cli/options/quantity.h"
 
 #include <gtest/gtest.h>
 

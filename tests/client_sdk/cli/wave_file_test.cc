@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/wave_file.h"
+#include "client_sdk/cli/output/wave_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

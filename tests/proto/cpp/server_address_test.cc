@@ -16,5 +16,16 @@ TEST(ServerAddress, IsASocketOrEndsWithAPort) {
   }
 }
 
+TEST(ServerAddress, IsOnThisMachineIfItIsASocketOrALoopbackAddress) {
+  for (const char* text :
+       {"unix:/run/x.sock", "localhost:1", "127.0.0.1:1", "127.8.0.1:1", "[::1]:1"}) {
+    EXPECT_TRUE(IsOnThisMachine(text)) << text;
+  }
+  for (const char* text : {"0.0.0.0:1", "10.0.0.1:1", "localhost.example.org:1",
+                           "127.example.org:1", "[::2]:1", "127.0.0.1.example.org:1"}) {
+    EXPECT_FALSE(IsOnThisMachine(text)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace carillon

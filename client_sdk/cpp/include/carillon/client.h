@@ -293,7 +293,8 @@ struct ConnectOptions {
   std::string tls_certificate_pem;
   std::string tls_key_pem;
   /// The token by which the daemon knows this client over TCP. If it is empty, $CARILLON_TOKEN is
-  /// taken.
+  /// taken. Without TLS a token is sent to this machine's own addresses only: unix:PATH, localhost,
+  /// 127.0.0.0/8 and [::1]. Calls of any other address fail with TLS_REQUIRED.
   std::string token;
 };
 

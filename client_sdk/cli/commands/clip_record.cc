@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/commands/clip_record.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "client_sdk/cli/commands/file_digest.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::cli {
+namespace {
+
+// Its members keep the order in which they were added.
+using Json = nlohmann::ordered_json;
+
+/// Text that is not UTF-8 gets a replacement character for each wrong byte.
+std::string LineOf(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+Json Array(const v1::Vec3& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
+Json ObjectJson(const v1::ContactTraceObject& object, const ClipFile* stem) {
+  Json json = {{"handle", object.handle()}, {"model", object.modal_model()}};
+  if (!object.label().empty()) json["label"] = object.label();
+  if (!object.material().preset().empty()) json["material"] = object.material().preset();
+  if (stem != nullptr) {
+    json["file"] = stem->name;
+    json["sha256"] = stem->digest;
+  }
+  return json;
+}
+
+Json BlowJson(const v1::Blow& blow) {
+  Json json = {{"time_s", blow.time_s()}, {"object", blow.object()}};
+  if (blow.has_other_object()) json["other_object"] = blow.other_object();
+  if (blow.has_partner()) json["partner"] = blow.partner();
+  json["point_m"] = Array(blow.point_m());
+  json["impulse_newton_seconds"] = Array(blow.impulse_newton_seconds());
+  json["duration_s"] = blow.duration_s();
+  return json;
+}
+
+Json SoundJson(const ClipRecord& record) {
+  const v1::RenderSummary& summary = record.summary;
+  Json json = {{"frame_count", summary.frame_count()},
+               {"peak_pa", summary.peak_pa()},
+               {"pa_per_sample", summary.full_scale_pa() / record.factor},
+               {"limited_frame_count", summary.limited_frame_count()},
+               {"rejected_count", summary.rejected_count()},
+               {"load_count", summary.findings().load_count()}};
+  if (summary.has_integrated_lufs()) json["integrated_lufs"] = summary.integrated_lufs();
+  return json;
+}
+
+bool IsThere(const std::filesystem::path& folder, const Json& file) {
+  const auto digest = FileDigest(folder / file.at("file").get<std::string>());
+  return digest.ok() && *digest == file.at("sha256");
+}
+
+bool IsWhole(const std::filesystem::path& folder, const ClipRecord& wanted, const Json& json) {
+  const Json& objects = json.at("objects");
+  return json.at("trace_sha256") == wanted.trace_digest &&
+         json.at("settings") == Json::parse(wanted.settings) && IsThere(folder, json) &&
+         std::all_of(objects.begin(), objects.end(), [&](const Json& object) {
+           return !object.contains("file") || IsThere(folder, object);
+         });
+}
+
+}  // namespace
+
+std::string SettingsText(const RenderOptions& options, const std::string& daemon_version) {
+  Json json = {{"sample_rate_hz", options.sample_rate_hz},
+               {"channel_count", options.channel_count},
+               {"bits", options.bits},
+               {"tail_s", options.tail_s},
+               {"gain", options.gain},
+               {"normalize", options.normalize},
+               {"stems", options.stems},
+               {"carillon", daemon_version}};
+  if (options.full_scale_pa) json["full_scale_pa"] = *options.full_scale_pa;
+  return json.dump();
+}
+
+std::string RecordLine(const ClipRecord& record) {
+  Json json = {{"clip", record.clip},
+               {"file", record.sound.name},
+               {"sha256", record.sound.digest},
+               {"trace_sha256", record.trace_digest},
+               {"settings", Json::parse(record.settings)}};
+  json.update(SoundJson(record));
+  json["objects"] = Json::array();
+  for (size_t i = 0; i < record.objects.size(); ++i) {
+    const ClipFile* const stem = i < record.stems.size() ? &record.stems[i] : nullptr;
+    json["objects"].push_back(ObjectJson(record.objects[i], stem));
+  }
+  json["blows"] = Json::array();
+  for (const v1::Blow& blow : record.blows) json["blows"].push_back(BlowJson(blow));
+  return LineOf(json);
+}
+
+std::string ErrorLine(const std::string& clip, const absl::Status& error) {
+  const v1::ErrorInfo info = ToErrorInfo(error);
+  return LineOf(
+      {{"clip", clip}, {"error", {{"reason", info.reason()}, {"message", info.message()}}}});
+}
+
+bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted) {
+  std::ifstream file(folder / absl::StrCat(wanted.clip, ".json"));
+  try {
+    const Json json = Json::parse(file);
+    return !json.contains("error") && IsWhole(folder, wanted, json);
+  } catch (const Json::exception&) {
+    return false;  // no record, or not one of ours
+  }
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "carillon/client.h"
+#include "client_sdk/cli/commands/commands.h"
+
+namespace carillon::cli {
+
+/// A sound file, by its name in the folder of the clips.
+struct ClipFile {
+  std::string name;
+  std::string digest;  ///< SHA-256, hexadecimal
+};
+
+/// The content of the record of a clip: a line of JSON, which docs/clips.md describes.
+struct ClipRecord {
+  std::string clip;          ///< the name of the trace without its suffix
+  std::string trace_digest;  ///< SHA-256, hexadecimal
+  std::string settings;      ///< SettingsText
+  ClipFile sound;
+  double factor = 1;  ///< by which the samples were multiplied
+  std::vector<v1::ContactTraceObject> objects;
+  std::vector<ClipFile> stems;  ///< one for each object, or none
+  v1::RenderSummary summary;
+  std::vector<v1::Blow> blows;
+};
+
+/// Returns, as JSON, everything on which the samples of a clip depend in addition to its trace and
+/// the models.
+std::string SettingsText(const RenderOptions& options, const std::string& daemon_version);
+
+/// These two functions return the line of a clip that was rendered, and the line of a clip that
+/// could not be rendered.
+std::string RecordLine(const ClipRecord& record);
+std::string ErrorLine(const std::string& clip, const absl::Status& error);
+
+/// Returns whether the record `clip`.json in `folder` was made from this trace with these settings,
+/// and whether all its files are there with the digests that the record states.
+bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted);
+
+}  // namespace carillon::cli

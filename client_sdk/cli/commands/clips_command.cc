@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `carillon render FOLDER --out FOLDER`: the contact traces of a folder, several at a time.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/synchronization/mutex.h"
+#include "client_sdk/cli/commands/clip_folder.h"
+#include "client_sdk/cli/commands/clip_record.h"
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/commands/file_digest.h"
+#include "client_sdk/cli/output/output.h"
+#include "client_sdk/cli/output/rendered_file.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Renders one clip after the other. Several threads may use one.
+class ClipRenderer {
+ public:
+  ClipRenderer(const client::Client& daemon, const RenderOptions& options, const ClipFolder& folder,
+               std::string settings)
+      : daemon_(daemon), options_(options), folder_(folder), settings_(std::move(settings)) {}
+
+  /// Returns whether there was anything to do. Errors: those of the trace and of the daemon.
+  absl::StatusOr<bool> Render(const std::string& clip) const {
+    const std::string trace = TracePath(clip);
+    ClipRecord record;
+    record.clip = clip;
+    record.settings = settings_;
+    ASSIGN_OR_RETURN(record.trace_digest, FileDigest(trace));
+    if (IsRendered(folder_.Final(""), record)) return false;
+    ASSIGN_OR_RETURN(record.objects, ReadObjects(trace));
+    RETURN_IF_ERROR(RenderSound(trace, record));
+    const std::string stems = absl::StrCat(clip, ".stems");
+    for (const v1::ContactTraceObject& object : record.objects) {
+      if (options_.stems) RETURN_IF_ERROR(RenderStem(trace, object.handle(), record));
+    }
+    std::error_code ignored;
+    if (record.stems.empty()) fs::remove_all(folder_.Final(stems), ignored);
+    if (!record.stems.empty()) RETURN_IF_ERROR(folder_.Publish(stems));
+    RETURN_IF_ERROR(folder_.Publish(record.sound.name));
+    RETURN_IF_ERROR(folder_.Write(absl::StrCat(clip, ".json"), RecordLine(record)));
+    return true;
+  }
+
+  absl::Status RecordError(const std::string& clip, const absl::Status& error) const {
+    return folder_.Write(absl::StrCat(clip, ".json"), ErrorLine(clip, error));
+  }
+
+ private:
+  std::string TracePath(const std::string& clip) const {
+    return (fs::path(options_.trace) / absl::StrCat(clip, ".contacts")).string();
+  }
+
+  static absl::StatusOr<std::vector<v1::ContactTraceObject>> ReadObjects(const std::string& path) {
+    ASSIGN_OR_RETURN(client::ContactTraceReader trace, client::ContactTraceReader::Open(path));
+    std::vector<v1::ContactTraceObject> objects;
+    while (true) {
+      ASSIGN_OR_RETURN(const std::optional<v1::ContactTraceRecord> record, trace.Next());
+      if (!record || !record->has_object()) return objects;
+      objects.push_back(record->object());
+    }
+  }
+
+  RenderedForm FormOf(const std::string& file) const {
+    return {.path = folder_.Work(file).string(),
+            .format = {.sample_rate_hz = options_.sample_rate_hz,
+                       .channel_count = options_.channel_count,
+                       .bits = options_.bits}};
+  }
+
+  absl::Status RenderSound(const std::string& trace, ClipRecord& record) const {
+    record.sound.name = absl::StrCat(record.clip, ".wav");
+    RenderedForm form = FormOf(record.sound.name);
+    form.factor = options_.gain;
+    form.normalize = options_.normalize;
+    v1::RenderSettings settings = SettingsOf(options_);
+    settings.set_tell_blows(true);
+    RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    RETURN_IF_ERROR(CheckHasContacts(trace, record.summary));
+    if (const auto better = BetterFullScale(options_, record.summary)) {
+      settings.set_full_scale_pa(*better);
+      RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
+    }
+    ASSIGN_OR_RETURN(record.sound.digest, FileDigest(form.path));
+    return absl::OkStatus();
+  }
+
+  /// The sound of one object: the others are struck as well, but silent.
+  absl::Status RenderStem(const std::string& trace, uint32_t handle, ClipRecord& record) const {
+    ClipFile stem;
+    stem.name = absl::StrCat(record.clip, ".stems/", handle, ".wav");
+    RenderedForm form = FormOf(stem.name);
+    form.factor = record.factor;
+    form.frame_count = record.summary.frame_count();
+    const std::string alone = folder_.Work(absl::StrCat(record.clip, ".alone")).string();
+    RETURN_IF_ERROR(WriteAlone(trace, handle, alone));
+    ClipRecord unused;
+    v1::RenderSettings settings = SettingsOf(options_);
+    settings.set_full_scale_pa(record.summary.full_scale_pa());
+    RETURN_IF_ERROR(RenderFile(alone, settings, form, unused));
+    std::error_code ignored;
+    fs::remove(alone, ignored);
+    ASSIGN_OR_RETURN(stem.digest, FileDigest(form.path));
+    record.stems.push_back(std::move(stem));
+    return absl::OkStatus();
+  }
+
+  static absl::Status WriteAlone(const std::string& path, uint32_t handle,
+                                 const std::string& alone) {
+    ASSIGN_OR_RETURN(client::ContactTraceReader trace, client::ContactTraceReader::Open(path));
+    ASSIGN_OR_RETURN(client::ContactTraceWriter copy,
+                     client::ContactTraceWriter::Create(alone, trace.header()));
+    while (true) {
+      ASSIGN_OR_RETURN(std::optional<v1::ContactTraceRecord> record, trace.Next());
+      if (!record) return copy.Close();
+      if (record->has_step()) {
+        RETURN_IF_ERROR(copy.Write(record->step()));
+      }
+      if (!record->has_object()) continue;
+      if (record->object().handle() != handle) record->mutable_object()->set_gain(0);
+      copy.Write(record->object());
+    }
+  }
+
+  /// Waits while the daemon renders as much as it may.
+  absl::Status RenderFile(const std::string& path, const v1::RenderSettings& settings,
+                          const RenderedForm& form, ClipRecord& record) const {
+    constexpr auto kPause = std::chrono::milliseconds(50);
+    while (true) {
+      absl::Status status = TryRenderFile(path, settings, form, record);
+      const std::string reason = status.ok() ? "" : ToErrorInfo(status).reason();
+      if (reason != "TOO_MANY_CALLS" && reason != "CLIENT_LIMIT_REACHED") return status;
+      std::this_thread::sleep_for(kPause);
+    }
+  }
+
+  absl::Status TryRenderFile(const std::string& path, const v1::RenderSettings& settings,
+                             const RenderedForm& form, ClipRecord& record) const {
+    ASSIGN_OR_RETURN(client::ContactTraceReader trace, client::ContactTraceReader::Open(path));
+    RenderedFile file(form);
+    record.blows.clear();
+    auto summary = daemon_.Render(
+        settings, trace, [&](const client::AudioBlock& block) { return file.Take(block); },
+        [&](const v1::Blow& blow) { record.blows.push_back(blow); });
+    RETURN_IF_ERROR(file.status());
+    RETURN_IF_ERROR(summary.status());
+    RETURN_IF_ERROR(file.Finish());
+    record.summary = *std::move(summary);
+    record.factor = file.factor();
+    return absl::OkStatus();
+  }
+
+  const client::Client& daemon_;
+  const RenderOptions& options_;
+  const ClipFolder& folder_;
+  const std::string settings_;
+};
+
+/// Whether an error would meet every other clip, too.
+bool StopsAll(const absl::Status& error) {
+  const std::string reason = ToErrorInfo(error).reason();
+  return reason == "SERVER_UNAVAILABLE" || reason == "OUTPUT_NOT_WRITABLE" ||
+         absl::IsUnauthenticated(error) || absl::IsPermissionDenied(error);
+}
+
+/// The clips of one run, of which each worker takes the next.
+class ClipRun {
+ public:
+  ClipRun(const ClipRenderer& renderer, std::vector<std::string> clips)
+      : renderer_(renderer), clips_(std::move(clips)) {}
+
+  /// Returns the error that stopped the run.
+  absl::Status Run(size_t worker_count) {
+    std::vector<std::jthread> workers;
+    for (size_t i = 0; i < worker_count; ++i) workers.emplace_back([this] { Work(); });
+    workers.clear();
+    return stop_;
+  }
+
+  size_t rendered_count() const { return rendered_count_; }
+  size_t kept_count() const { return kept_count_; }
+  size_t failed_count() const { return failed_count_; }
+
+ private:
+  void Work() {
+    for (size_t i = next_++; i < clips_.size() && !stopped_; i = next_++) Take(clips_[i]);
+  }
+
+  void Take(const std::string& clip) {
+    const absl::StatusOr<bool> rendered = renderer_.Render(clip);
+    if (rendered.ok()) {
+      ++(*rendered ? rendered_count_ : kept_count_);
+      return;
+    }
+    if (StopsAll(rendered.status())) return Stop(rendered.status());
+    ++failed_count_;
+    const absl::Status recorded = renderer_.RecordError(clip, rendered.status());
+    if (!recorded.ok()) Stop(recorded);
+  }
+
+  void Stop(const absl::Status& error) {
+    const absl::MutexLock lock(&mutex_);
+    if (!stopped_.exchange(true)) stop_ = error;
+  }
+
+  const ClipRenderer& renderer_;
+  const std::vector<std::string> clips_;
+  std::atomic<size_t> next_{0}, rendered_count_{0}, kept_count_{0}, failed_count_{0};
+  std::atomic<bool> stopped_{false};
+  absl::Mutex mutex_;
+  absl::Status stop_;  // guarded by mutex_ until the workers have ended
+};
+
+std::vector<std::string> OfShard(const std::vector<std::string>& clips, const Shard& shard) {
+  std::vector<std::string> mine;
+  for (size_t i = shard.number - 1; i < clips.size(); i += shard.count) mine.push_back(clips[i]);
+  return mine;
+}
+
+void PrintRun(const ClipRun& run, double seconds, bool json) {
+  if (json) {
+    absl::PrintF("{\"rendered\":%d,\"kept\":%d,\"failed\":%d,\"seconds\":%.3f}\n",
+                 run.rendered_count(), run.kept_count(), run.failed_count(), seconds);
+    return;
+  }
+  absl::PrintF("%s in %.1f s (%.0f an hour), %d there already, %d failed\n",
+               Counted(run.rendered_count(), "clip"), seconds,
+               static_cast<double>(run.rendered_count()) * 3600 / std::max(seconds, 1e-3),
+               run.kept_count(), run.failed_count());
+}
+
+}  // namespace
+
+absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json) {
+  const auto begin = std::chrono::steady_clock::now();
+  ASSIGN_OR_RETURN(const std::vector<std::string> clips, ListTraces(options.trace));
+  ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());
+  ASSIGN_OR_RETURN(const ClipFolder folder, ClipFolder::Open(options.out));
+  const ClipRenderer renderer(daemon, options, folder, SettingsText(options, mixer.version()));
+  ClipRun run(renderer, OfShard(clips, options.shard));
+  const absl::Status stopped = run.Run(options.worker_count);
+  RETURN_IF_ERROR(folder.WriteManifest(clips));
+  PrintRun(run, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
+           json);
+  RETURN_IF_ERROR(stopped);
+  if (run.failed_count() == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kFailedPrecondition, "CLIPS_FAILED",
+                 absl::StrCat(Counted(run.failed_count(), "clip"), " could not be rendered; ",
+                              folder.Final("manifest.jsonl").string(),
+                              " says why; repair what it names and run the command again"));
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/commands/material_figures.h"
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/loss_factor.h"
+#include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+
+absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
+  v1::Material material;
+  material.set_preset(figures.preset);
+  if (figures.young_pa) material.set_young_pa(*figures.young_pa);
+  if (figures.poisson_ratio) material.set_poisson_ratio(*figures.poisson_ratio);
+  if (figures.density_kg_per_m3) material.set_density_kg_per_m3(*figures.density_kg_per_m3);
+  if (figures.alpha1_s) material.set_alpha1_s(*figures.alpha1_s);
+  if (figures.alpha2_per_s) material.set_alpha2_per_s(*figures.alpha2_per_s);
+  if (!figures.loss_factor.empty()) {
+    ASSIGN_OR_RETURN(const auto points, ReadLossFactor(figures.loss_factor));
+    SetLossFactor(points, material);
+  }
+  if (!figures.lame_lambda_pa && !figures.lame_mu_pa) return material;
+  if (!figures.lame_lambda_pa || !figures.lame_mu_pa || figures.young_pa || figures.poisson_ratio) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                   "give --young and --poisson, or both --lame-lambda and --lame-mu");
+  }
+  const double lambda = *figures.lame_lambda_pa, mu = *figures.lame_mu_pa;
+  material.set_young_pa(mu * (3 * lambda + 2 * mu) / (lambda + mu));
+  material.set_poisson_ratio(lambda / (2 * (lambda + mu)));
+  return material;
+}
+
+std::string MaterialText(const v1::Material& material) {
+  v1::Material figures = material;
+  figures.clear_preset();
+  std::string text = figures.ShortDebugString();
+  if (material.preset().empty()) return text;
+  const std::string preset = EscapedText(material.preset());
+  return text.empty() ? preset : absl::StrCat(preset, " with ", text);
+}
+
+}  // namespace carillon::cli

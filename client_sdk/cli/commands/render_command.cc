@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/output/output.h"
+#include "client_sdk/cli/output/rendered_file.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+/// The limiter works from 3 dB below full scale on.
+constexpr double kHeadroom = 1.4126;
+/// -40 dB of full scale: a softer sound is rendered again before it is normalised.
+constexpr double kSoft = 0.01;
+/// -60 dB of full scale: a softer file is hardly heard.
+constexpr double kFaint = 0.001;
+/// The least full scale that the contract allows, Pa.
+constexpr double kLeastFullScale_pa = 0.00002;
+
+/// Prints what the user should know about the sound.
+void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summary, std::FILE* out) {
+  if (summary.paper_coupling_object_count() > 0) {
+    absl::FPrintF(
+        out,
+        "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
+        "transfer for the material; `carillon transfer` makes one\n",
+        Counted(summary.paper_coupling_object_count(), "object"));
+  }
+  const double written = summary.peak() * options.gain;
+  if (!options.normalize && written > 0 && written < kFaint) {
+    absl::FPrintF(out,
+                  "the file peaks at %s; raise it by --gain, --normalize or --full-scale-pa %.2g\n",
+                  Decibels(written), std::max(summary.peak_pa() * 2, kLeastFullScale_pa));
+  }
+}
+
+void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary,
+                  uint32_t sample_rate_hz) {
+  std::FILE* const out = options.out == "-" ? stderr : stdout;
+  // EBU R 128 measures no sound of less than 0.4 s.
+  const bool is_short = static_cast<double>(summary.frame_count()) < 0.4 * sample_rate_hz;
+  const auto loudness = [is_short](bool present, double lufs) {
+    return is_short ? "too short to measure" : Loudness(present, lufs);
+  };
+  absl::FPrintF(out, "%s: %.2f s, %s, peak %s%s\n", options.out,
+                static_cast<double>(summary.frame_count()) / sample_rate_hz,
+                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()),
+                summary.limited_frame_count() > 0 ? " before the limiter" : "");
+  absl::FPrintF(out,
+                "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
+                summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
+                loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
+                loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
+  if (summary.rejected_count() > 0) {
+    absl::FPrintF(out, "%s could not be used; the newest: %s: %s\n",
+                  Counted(summary.rejected_count(), "impulse"), summary.last_rejection().reason(),
+                  summary.last_rejection().message());
+  }
+  for (const v1::Warning& warning : summary.warnings()) {
+    absl::FPrintF(out, "%s: %s\n", warning.id(), warning.text());
+  }
+  PrintFindings(options, summary, out);
+  if (summary.limited_frame_count() > 0) {
+    absl::FPrintF(out, "the limiter worked in %s; --full-scale-pa above %.4g would avoid it\n",
+                  Counted(summary.limited_frame_count(), "frame"), summary.peak_pa() * kHeadroom);
+  }
+}
+
+/// Says how the file differs from the rendering that the summary describes.
+void PrintFile(const RenderOptions& options, const RenderedFile& file) {
+  std::FILE* const out = options.out == "-" ? stderr : stdout;
+  if (file.factor() != 1) {
+    absl::FPrintF(out, "the file has the sound times %.4g, with a peak of %s\n", file.factor(),
+                  Decibels(file.clipped_count() > 0 ? 1.0 : file.peak()));
+  }
+  if (file.clipped_count() > 0) {
+    absl::FPrintF(out,
+                  "clipped: %s; a --gain up to %.3g, --normalize or --bits 32 would "
+                  "avoid it\n",
+                  Counted(file.clipped_count(), "sample"), options.gain / file.peak());
+  }
+}
+
+}  // namespace
+
+v1::RenderSettings SettingsOf(const RenderOptions& options) {
+  v1::RenderSettings settings;
+  settings.set_sample_rate_hz(options.sample_rate_hz);
+  settings.set_channel_count(options.channel_count);
+  settings.set_tail_s(options.tail_s);
+  if (options.full_scale_pa) settings.set_full_scale_pa(*options.full_scale_pa);
+  return settings;
+}
+
+std::optional<double> BetterFullScale(const RenderOptions& options,
+                                      const v1::RenderSummary& summary) {
+  const bool soft = summary.peak() > 0 && summary.peak() < kSoft;
+  const bool good = !soft && summary.limited_frame_count() == 0;
+  if (!options.normalize || options.full_scale_pa || good) return std::nullopt;
+  constexpr double kAbovePeak = 1.5;  // the limiter must not work
+  return std::max(summary.peak_pa() * kAbovePeak, kLeastFullScale_pa);
+}
+
+absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary) {
+  for (const v1::Warning& warning : summary.warnings()) {
+    if (warning.id() != "TRACE_EMPTY") continue;
+    return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
+                   absl::StrCat(path, ": ", warning.text()));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
+  RenderedFile file({.path = options.out,
+                     .format = {.sample_rate_hz = options.sample_rate_hz,
+                                .channel_count = options.channel_count,
+                                .bits = options.bits},
+                     .factor = options.gain,
+                     .normalize = options.normalize});
+  const auto render = [&](const v1::RenderSettings& settings) -> absl::StatusOr<v1::RenderSummary> {
+    ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
+    return daemon.Render(settings, trace,
+                         [&](const client::AudioBlock& block) { return file.Take(block); });
+  };
+  v1::RenderSettings settings = SettingsOf(options);
+  auto summary = render(settings);
+  // A trace that comes through a pipe cannot be read twice.
+  const bool rereadable = std::filesystem::is_regular_file(options.trace);
+  if (const auto better =
+          summary.ok() && rereadable ? BetterFullScale(options, *summary) : std::nullopt) {
+    file.Restart();
+    settings.set_full_scale_pa(*better);
+    summary = render(settings);
+  }
+  RETURN_IF_ERROR(file.status());
+  if (!summary.ok()) return summary.status();
+  RETURN_IF_ERROR(file.Finish());
+  RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
+  if (json) {
+    PrintJson(*summary);
+  } else {
+    PrintSummary(options, *summary, options.sample_rate_hz);
+    PrintFile(options, file);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::cli

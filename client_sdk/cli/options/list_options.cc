@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command lines of `carillon job`, `carillon material`, `carillon scene` and `carillon
+// example`.
+#include "client_sdk/cli/options/list_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/options/sound_options.h"
+#include "client_sdk/cli/options/value_options.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Adds the command that runs a job on this machine.
+void AddJobRun(CLI::App& job, Program& program) {
+  auto options = std::make_shared<RunJobOptions>();
+  CLI::App& run = *job.add_subcommand(
+      "run", "Run a job of the daemon on this machine; the batch jobs of a cluster call it");
+  run.add_option("digest", options->digest, "The digest of the job")->required();
+  run.add_option("command", options->command,
+                 "The command that reads the file mesh and writes the file model")
+      ->required();
+  run.add_option("--token", options->token, "The token of this run [$CARILLON_JOB_TOKEN]")
+      ->envname("CARILLON_JOB_TOKEN")
+      ->required();
+  run.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return RunJob(*program.Daemon(), *options, stop);
+    };
+  });
+}
+
+/// Adds a command about one thing, which `description` says how to name.
+template <class Run>
+void AddAbout(CLI::App& parent, const std::string& name, const std::string& text,
+              const std::string& description, Run run) {
+  auto thing = std::make_shared<std::string>();
+  CLI::App& command = *parent.add_subcommand(name, text);
+  command.add_option(parent.get_name(), *thing, description)->required();
+  command.callback([run, thing] { run(*thing); });
+}
+
+/// The options that choose jobs by state and label.
+struct JobChoice {
+  std::vector<std::string> states;
+  std::string label;
+};
+
+void AddJobChoice(CLI::App& command, JobChoice& choice) {
+  command
+      .add_option("--state", choice.states,
+                  "Only jobs in these states: waiting, running, done, failed, cancelled [any]")
+      ->delimiter(',')
+      ->transform(CLI::IsMember(
+                      {"waiting", "queued", "running", "done", "succeeded", "failed", "cancelled"},
+                      CLI::ignore_case)
+                      .description(""));
+  command.add_option("--label", choice.label, "Only jobs whose label contains this text");
+}
+
+/// The state with a name that AddJobChoice allows.
+v1::JobState StateOf(const std::string& name) {
+  if (name == "waiting" || name == "queued") return v1::JOB_STATE_QUEUED;
+  if (name == "running") return v1::JOB_STATE_RUNNING;
+  if (name == "failed") return v1::JOB_STATE_FAILED;
+  return name == "cancelled" ? v1::JOB_STATE_CANCELLED : v1::JOB_STATE_SUCCEEDED;
+}
+
+/// The request for the chosen jobs: a ListJobsRequest or a WatchJobsRequest.
+template <class Request>
+Request RequestOf(const JobChoice& choice) {
+  Request request;
+  for (const std::string& state : choice.states) request.add_states(StateOf(state));
+  request.set_label_contains(choice.label);
+  return request;
+}
+
+void AddJobList(CLI::App& job, Program& program) {
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& list = *job.add_subcommand("list", "List the jobs, newest first");
+  AddJobChoice(list, *choice);
+  list.callback([&program, choice] {
+    program.command = [&program, choice] {
+      return ListJobs(*program.Daemon(), RequestOf<v1::ListJobsRequest>(*choice), program.json);
+    };
+  });
+}
+
+void AddJobWatch(CLI::App& job, const std::string& named, Program& program) {
+  auto text = std::make_shared<std::string>();
+  auto choice = std::make_shared<JobChoice>();
+  CLI::App& watch = *job.add_subcommand(
+      "watch", "Show the progress of a job until it ends, or the changes of all jobs");
+  watch.add_option("job", *text, named + " [all jobs, until the program is stopped]");
+  AddJobChoice(watch, *choice);
+  watch.callback([&program, text, choice] {
+    program.command = [&program, text, choice] {
+      if (!text->empty()) return WatchJob(*program.Daemon(), *text, program.json);
+      return WatchJobs(*program.Daemon(), RequestOf<v1::WatchJobsRequest>(*choice), program.json);
+    };
+  });
+}
+
+}  // namespace
+
+void AddJob(CLI::App& app, Program& program) {
+  CLI::App& job = *app.add_subcommand("job", "List, follow, cancel and run decomposition jobs")
+                       ->require_subcommand(1);
+  AddJobList(job, program);
+  const std::string named = "The name, the label, or the first digits of the digest of a job";
+  AddAbout(job, "show", "Show a job", named, [&program](const std::string& text) {
+    program.command = [&program, text] { return ShowJob(*program.Daemon(), text, program.json); };
+  });
+  AddJobWatch(job, named, program);
+  AddAbout(job, "cancel", "Cancel a job that has not ended", named,
+           [&program](const std::string& text) {
+             program.command = [&program, text] {
+               return CancelJob(*program.Daemon(), text, program.json);
+             };
+           });
+  AddJobRun(job, program);
+}
+
+void AddMaterials(CLI::App& app, Program& program) {
+  auto name = std::make_shared<std::string>();
+  CLI::App& material = *app.add_subcommand(
+      "material", "List the named materials, or show the figures of one and their source");
+  material.add_option("material", *name, "The name of a material [a list of all]");
+  material.callback([&program, name] {
+    program.command = [&program, name] {
+      return name->empty() ? ListMaterials(*program.Daemon(), program.json)
+                           : ShowMaterial(*program.Daemon(), *name, program.json);
+    };
+  });
+}
+
+void AddScenes(CLI::App& app, Program& program) {
+  CLI::App& scene =
+      *app.add_subcommand("scene", "List, record and delete scenes")->require_subcommand(1);
+  scene.add_subcommand("list", "List the scenes and their objects")->callback([&program] {
+    program.command = [&program] { return ListScenes(*program.Daemon(), program.json); };
+  });
+  AddAbout(scene, "delete", "Fade out the objects of a scene and delete it",
+           "The name or the number of a scene", [&program](const std::string& text) {
+             program.command = [&program, text] {
+               return DeleteScene(*program.Daemon(), text, program.json);
+             };
+           });
+  AddSceneRecord(scene, program);
+}
+
+void AddExample(CLI::App& app, Program& program) {
+  auto name = std::make_shared<std::string>();
+  auto out = std::make_shared<std::string>();
+  std::vector<std::string> names;
+  for (const Example& example : Examples()) names.push_back(example.name);
+  CLI::App& command = *app.add_subcommand("example", "Write the mesh file of a body to try");
+  command.add_option("example", *name, "bell, bowl, bar or chime")
+      ->required()
+      ->check(CLI::IsMember(names));
+  command.add_option("--out", *out, "The OBJ file to write [NAME.obj]")
+      ->check([](const std::string& path) { return WhyNotWritten(path, {".obj"}); });
+  command.callback([&program, name, out] {
+    program.command = [&program, name, out] {
+      const Example& example = *std::ranges::find(Examples(), *name, &Example::name);
+      return WriteExample(example, *out, program.json);
+    };
+  });
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/options/material_options.h"
+
+#include <CLI/CLI.hpp>
+
+namespace carillon::cli {
+namespace {
+
+template <class T>
+void AddFigure(CLI::App& app, const std::string& name, std::optional<T>& target,
+               const std::string& description) {
+  app.add_option(name, target, description)->group("Material");
+}
+
+}  // namespace
+
+void AddMaterial(CLI::App& app, MaterialFigures& material) {
+  app.add_option("--material", material.preset,
+                 "A named material; the figures below override its own")
+      ->group("Material");
+  AddFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
+  AddFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
+  AddFigure(app, "--lame-lambda", material.lame_lambda_pa, "Lame's first constant, Pa");
+  AddFigure(app, "--lame-mu", material.lame_mu_pa, "Lame's second constant, Pa");
+  AddFigure(app, "--density", material.density_kg_per_m3, "Density, kg/m^3");
+  AddFigure(app, "--alpha1", material.alpha1_s,
+            "Damping in proportion to stiffness, s; it replaces a loss factor");
+  AddFigure(app, "--alpha2", material.alpha2_per_s, "Damping proportional to mass, 1/s");
+  app.add_option("--loss-factor", material.loss_factor,
+                 "Damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
+      ->group("Material");
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/options/render_options.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/options/value_options.h"
+
+namespace carillon::cli {
+namespace {
+
+/// Traces that a daemon renders at a time.
+constexpr size_t kMostWorkers = 8;
+
+std::optional<Shard> ParseShard(const std::string& text) {
+  const size_t slash = text.find('/');
+  uint32_t number = 0, count = 0;
+  if (slash == std::string::npos || !absl::SimpleAtoi(text.substr(0, slash), &number) ||
+      !absl::SimpleAtoi(text.substr(slash + 1), &count) || number < 1 || number > count) {
+    return std::nullopt;
+  }
+  return Shard{.number = number, .count = count};
+}
+
+void AddSound(CLI::App& render, RenderOptions& options) {
+  ReadGain(*render.add_option(
+      "--gain", options.gain,
+      absl::StrCat("The gain of every sample of the file, after the limiter: ", kGainForm)));
+  render.add_option("--full-scale-pa", options.full_scale_pa,
+                    "The pressure of a sample of full scale, Pa [200]");
+  render.add_flag(
+      "--normalize", options.normalize,
+      "Scale the sound to a peak of 0.9 of full scale; a sound that is below -40 dBFS or that the "
+      "limiter changed is rendered again, with a full scale a little above its peak. Then --gain "
+      "applies");
+  render
+      .add_option("--bits", options.bits, "The size of a sample: 16, 24, or 32 for floating point")
+      ->check(CLI::IsMember({16, 24, 32}))
+      ->capture_default_str();
+  render.add_option("--sample-rate", options.sample_rate_hz, "The sample rate, Hz")
+      ->capture_default_str();
+  render
+      .add_option("--channels", options.channel_count,
+                  "The number of channels: 1 for mono, 2 for stereo")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
+  render.add_option(
+      "--tail", options.tail_s,
+      "The time to render after the last contact, s; 0 renders until the sound has died "
+      "away [0]");
+}
+
+void AddFolder(CLI::App& render, RenderOptions& options) {
+  options.worker_count = std::clamp<size_t>(std::thread::hardware_concurrency(), 1, kMostWorkers);
+  render.add_flag("--stems", options.stems,
+                  "Write the sound of each object alone, too (of a folder)");
+  render
+      .add_option("--workers", options.worker_count, "The clips to render at a time (of a folder)")
+      ->check(CLI::Range(size_t{1}, kMostWorkers))
+      ->capture_default_str();
+  render
+      .add_option_function<std::string>(
+          "--shard", [&options](const std::string& text) { options.shard = *ParseShard(text); },
+          "The part of the folder to render: I/N is every N-th trace from the I-th on, such as "
+          "$SLURM_ARRAY_TASK_ID/10 [1/1]")
+      ->check([](const std::string& text) {
+        return ParseShard(text) ? "" : text + " is not I/N with I from 1 to N, such as 3/10";
+      });
+}
+
+/// Whether the path is a folder, as far as this user can see.
+bool IsFolder(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_directory(path, ignored);
+}
+
+std::string WhyNoFolder(const std::string& out) {
+  std::error_code ignored;
+  if (out != "-" && (!std::filesystem::exists(out, ignored) || IsFolder(out))) return "";
+  return absl::StrCat("\"", out, "\" must be a folder, because a folder of traces is rendered");
+}
+
+/// Refuses options that the command would not follow for the trace, or the folder, that is named.
+void CheckUse(const CLI::App& render, const RenderOptions& options) {
+  const bool is_folder = IsFolder(options.trace);
+  for (const char* option : {"--stems", "--workers", "--shard"}) {
+    if (is_folder || render.count(option) == 0) continue;
+    throw CLI::ValidationError(option,
+                               absl::StrCat("is for a folder of traces, and \"", options.trace,
+                                            "\" is none; name a folder, or leave the option out"));
+  }
+  const std::string wrong =
+      is_folder ? WhyNoFolder(options.out) : WhyNotWritten(options.out, {".wav", ".wave"});
+  if (!wrong.empty()) throw CLI::ValidationError("--out", wrong);
+}
+
+}  // namespace
+
+void AddRender(CLI::App& app, Program& program) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App& render = *app.add_subcommand(
+      "render", "Render a contact trace to a WAV file, or a folder of traces to a folder");
+  render
+      .add_option("trace", options->trace, "The contact trace (.contacts), or a folder of traces")
+      ->required();
+  render
+      .add_option("--out", options->out,
+                  "The WAV file to write, or - for stdout; the folder for a folder")
+      ->required();
+  AddSound(render, *options);
+  AddFolder(render, *options);
+  render.callback([&program, &render, options] {
+    CheckUse(render, *options);
+    CheckJson(program, options->out);
+    program.command = [&program, options] {
+      return IsFolder(options->trace) ? RenderClips(*program.Daemon(), *options, program.json)
+                                      : Render(*program.Daemon(), *options, program.json);
+    };
+  });
+}
+
+}  // namespace carillon::cli

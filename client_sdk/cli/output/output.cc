@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/output/output.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::cli {
+
+void OpenStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) >= 0) continue;
+    // The lowest free number is that of the stream. A file that is open for reading refuses output.
+    (void)open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR);
+  }
+}
+
+absl::Status FlushOutput() {
+  const bool flushed = std::fflush(stdout) == 0;
+  const char* const why = flushed ? "an earlier write failed" : std::strerror(errno);
+  if (flushed && std::ferror(stdout) == 0) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat("stdout: ", why,
+                              "; a part of the output is lost: send it to a file or a pipe that "
+                              "takes it"));
+}
+
+int Report(const absl::Status& status) {
+  if (status.ok()) return kDone;
+  const v1::ErrorInfo error = ToErrorInfo(status);
+  std::string message = error.message();
+  std::ranges::replace(message, '\n', ' ');
+  absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);
+  for (const v1::Remedy& remedy : error.remedies()) {
+    absl::FPrintF(stderr, "carillon: try %s\n", RemedyText(remedy));
+  }
+  return error.reason() == "SERVER_UNAVAILABLE" ? kNoServer : kRefused;
+}
+
+void PrintJson(const google::protobuf::Message& message) {
+  absl::PrintF("%s\n", MessageJson(message));
+}
+
+void PrintJson(std::initializer_list<JsonMember> members) {
+  absl::PrintF("%s\n", MembersJson(members));
+}
+
+void PrintNothing(absl::string_view noun) { absl::FPrintF(stderr, "no %s to show\n", noun); }
+
+std::string Counted(uint64_t count, absl::string_view noun) {
+  const char* const ending = count == 1 ? "" : absl::EndsWith(noun, "sh") ? "es" : "s";
+  return absl::StrCat(count, " ", noun, ending);
+}
+
+std::string Decibels(double amplitude) {
+  constexpr double kSilence = 0x1p-24;  // half of the smallest step of 24 bits
+  if (amplitude < kSilence) return "silence";
+  return absl::StrFormat("%.1f dBFS", 20 * std::log10(amplitude));
+}
+
+std::string Loudness(bool present, double lufs) {
+  return present ? absl::StrFormat("%.1f LUFS", lufs) : "below -70 LUFS";
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <google/protobuf/message.h>
+
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/strings/string_view.h"
+#include "client_sdk/cli/output/message_json.h"
+
+namespace carillon::cli {
+
+/// Exit codes of the program.
+enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
+
+/// Opens the standard streams that are closed, because files and sockets opened later would take
+/// their numbers. Writing to a stdout that was closed fails.
+void OpenStandardStreams();
+
+/// Flushes stdout. Errors: Internal (OUTPUT_NOT_WRITABLE: a part of the output is lost).
+absl::Status FlushOutput();
+
+/// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
+int Report(const absl::Status& status);
+
+/// Prints `message` to stdout as one line of JSON; see MessageJson.
+void PrintJson(const google::protobuf::Message& message);
+
+/// Prints an object with the members to stdout as one line of JSON; see MembersJson.
+void PrintJson(std::initializer_list<JsonMember> members);
+
+/// Prints to stderr that a list has no entry of the kind `noun`, so that stdout stays empty.
+void PrintNothing(absl::string_view noun);
+
+/// Returns a number with its noun, such as "1 mode", "2 modes" or "0 meshes".
+std::string Counted(uint64_t count, absl::string_view noun);
+
+/// Returns a linear amplitude (full scale is 1) as text, such as "-6.0 dBFS". An amplitude
+/// below half of the smallest step of 24 bits is "silence".
+std::string Decibels(double amplitude);
+
+/// Returns a loudness as text, such as "-23.0 LUFS", or "below -70 LUFS" if it is absent. The
+/// standard (ITU-R BS.1770) leaves out all sound below -70 LUFS.
+std::string Loudness(bool present, double lufs);
+
+}  // namespace carillon::cli
