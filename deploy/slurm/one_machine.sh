@@ -5,7 +5,7 @@
 # deploy/slurm/one_machine.sh stop|slurmctld|slurmd FOLDER
 #
 # A Slurm cluster on this machine alone, in FOLDER, on ports of its own and beside any other: for the tests, and to try
-# the daemon's --executor slurm. It has one node, or NODES, node1 and so on, each with all cores and all memory. Needs
+# the daemon's --slurm-dir. It has one node, or NODES, node1 and so on, each with all cores and all memory. Needs
 # Debian's slurm-wlm and munge, and root, as slurmd does. `slurmctld` starts the controller again and `slurmd` node1,
 # after a crash for instance. The commands of Slurm find the cluster by
 #

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/daemon/daemon_metrics.h"
 
-#include <malloc.h>
 #include <unistd.h>
 
 #include <cstdint>
@@ -13,6 +12,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/strip.h"
+#include "server/daemon/heap.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/maintenance/database_admin.h"
 
@@ -186,11 +186,6 @@ double ResidentBytes() {
   return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-double AllocatedBytes() {
-  const struct mallinfo2 heap = mallinfo2();
-  return static_cast<double>(heap.uordblks + heap.hblkhd);
-}
-
 }  // namespace
 
 std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms) {
@@ -213,7 +208,7 @@ std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms) {
   Gauge(metrics, "process_resident_memory_bytes", "Resident memory of the daemon alone.",
         ResidentBytes());
   Gauge(metrics, "carillon_heap_bytes", "Memory that the daemon has allocated and not freed.",
-        AllocatedBytes());
+        static_cast<double>(AllocatedBytes()));
   return metrics;
 }
 

@@ -31,7 +31,6 @@
 #include "server/daemon/daemon_log.h"
 #include "server/daemon/daemon_metrics.h"
 #include "server/daemon/data_directory.h"
-#include "server/daemon/free_memory.h"
 #include "server/daemon/memory_limits.h"
 #include "server/daemon/options.h"
 #include "server/daemon/room_settings.h"
@@ -54,6 +53,8 @@ namespace carillon {
 namespace {
 
 constexpr char kVersion[] = CARILLON_VERSION;
+/// Decompositions that may wait at a time.
+constexpr size_t kMostQueuedJobs = 1024;
 
 /// Reads the command line and the configuration file once more.
 using ReadOptions = std::function<absl::StatusOr<CommandLine>()>;
@@ -110,15 +111,15 @@ void LogOutput(const LiveOutput& output) {
 absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
                                                        const DataDirectory& directory,
                                                        const Clock& clock, RemoteRuns& runs) {
-  if (options.executor == "local") return MakeLocalExecutor(LocalExecutorOptionsOf(options), clock);
+  if (!options.uses_slurm()) return MakeLocalExecutor(LocalExecutorOptionsOf(options), clock);
   SlurmExecutorOptions slurm;
   slurm.program = options.precompute_program;
   slurm.directory = options.slurm_directory;
   if (slurm.directory.empty()) slurm.directory = directory.database_file().parent_path() / "slurm";
-  slurm.partition = options.slurm_partition;
+  const char* const tls_roots = std::getenv("CARILLON_TLS_ROOTS");
   slurm.upload = {.address = options.slurm_upload,
-                  .client = options.slurm_client,
-                  .tls_roots_file = options.slurm_tls_roots};
+                  .client = std::filesystem::path(slurm.program).replace_filename("carillon"),
+                  .tls_roots_file = tls_roots == nullptr ? "" : tls_roots};
   if (options.worker_count > 0) slurm.job_count = options.worker_count;
   if (options.job_memory_mib > 0) {
     slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
@@ -136,9 +137,8 @@ absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& opt
                    MakeExecutor(options, directory, clock, runs));
   return DecompositionQueue::Make(
       database, std::move(executor), clock,
-      {.max_queued_count = static_cast<size_t>(options.queue_limit),
-       .max_queued_count_of_client =
-           ClientLimits::ShareOf(static_cast<size_t>(options.queue_limit), options.client_share),
+      {.max_queued_count = kMostQueuedJobs,
+       .max_queued_count_of_client = ClientLimits::ShareOf(kMostQueuedJobs, options.client_share),
        .transfers = options.transfers,
        .log = LogWarning,
        .log_event = LogEvent});
@@ -187,7 +187,7 @@ void Reload(const ReadOptions& read_options, Options& options, ApiServer& server
 
 /// Checks that decompositions can run, as far as this machine decides it.
 absl::Status CheckDecomposition(const Options& options) {
-  if (options.executor != "local") return absl::OkStatus();
+  if (options.uses_slurm()) return absl::OkStatus();
   RETURN_IF_ERROR(CheckLocalExecutor(LocalExecutorOptionsOf(options)));
   return CheckWorkFolder(DataDirectory::WorkDirectory(options.data_directory));
 }
@@ -208,7 +208,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   AnnounceReady(rooms.server);
   std::optional<Watchdog> watchdog;
   if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
-  WaitForStop([&] { Reload(read_options, options, rooms.server); }, ReturnFreeMemory, LogInfo);
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
   ExpectEnd();
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");
@@ -334,7 +334,7 @@ int Main(int argc, char* const* argv) {
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();
   if (!command.ok()) return Fail(command.status(), kWrongUsage);
-  if (!command->run) return command->exit_status;
+  if (!command->run) return EXIT_SUCCESS;
   if (command->only_print) {
     std::cout << PrintConfiguration(command->options);
     return EXIT_SUCCESS;
@@ -342,7 +342,6 @@ int Main(int argc, char* const* argv) {
   SetLogLevel(command->options.log_level);
   if (command->only_check) return CheckOnly(*command);
   if (command->database_command.empty()) {
-    BoundFreeMemory(argv);
     return RunDaemon(*command, read_options);
   }
   const absl::Status status = RunDatabaseCommand(*command);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "server/synthesis/bank/level.h"
 
 namespace carillon {
@@ -21,26 +22,17 @@ struct Options {
   uint32_t block_frame_count = 128;
   uint32_t look_ahead_block_count = 8;
   uint32_t channel_count = 1;
-  double gain = 1;  ///< linear gain of the output
   double full_scale_pa = kFullScalePa;
   std::string head_file;          ///< SOFA file for binaural scenes; if empty, libmysofa1's
   int worker_count = 0;           ///< decompositions at a time; 0 means half of the processors
   int64_t memory_budget_mib = 0;  ///< memory of all decompositions; 0 means half of the machine's
   int64_t job_memory_mib = 0;     ///< memory of one decomposition; 0 means the whole budget
   double job_time_s = 21600;
-  double stall_time_s = 60;        ///< longest time without an event of a worker
-  int64_t queue_limit = 1024;      ///< jobs that wait at a time
   bool transfers = true;           ///< compute a transfer after each model
   int64_t model_budget_mib = 0;    ///< size of stored models; 0 means no limit
-  std::string executor = "local";  ///< "local" or "slurm"
-  std::string slurm_directory;     ///< shared with the nodes; if empty, "slurm" in the data folder
-  std::string slurm_partition;     ///< if empty, the cluster's default
-  std::string slurm_upload;  ///< HOST:PORT at which nodes reach the daemon; empty if they share a
-                             ///< folder with it
-  std::string slurm_client;  ///< path of `carillon` on every node
-  std::string slurm_tls_roots;     ///< path of a PEM file on every node
   std::string precompute_program;  ///< path of carillon-precompute
-  std::string audio_program;       ///< path of carillon-audio
+  std::string slurm_directory;     ///< shared with the nodes of a Slurm cluster
+  std::string slurm_upload;  ///< HOST:PORT at which nodes without that folder reach the daemon
   std::string tls_certificate_file;
   std::string tls_key_file;
   std::string tls_client_roots_file;
@@ -51,6 +43,9 @@ struct Options {
   std::string log_level = "info";  ///< least level that is logged: debug, info, warning or error
 
   bool operator==(const Options&) const = default;
+
+  /// Whether a Slurm cluster runs the decompositions, rather than this machine.
+  bool uses_slurm() const { return !slurm_directory.empty() || !slurm_upload.empty(); }
 };
 
 /// Exit status after an error in the command line or in the configuration file.
@@ -64,19 +59,18 @@ using SettingPlaces = std::map<std::string, std::string>;
 struct CommandLine {
   Options options;
   SettingPlaces places{};
-  bool run = false;  ///< if false, end with exit_status (after --help, --version or a wrong flag)
+  bool run = false;  ///< if false, end with success (after --help and --version)
   /// "check", "repair" or "restore" if the program is to do this to the database, which no daemon
   /// may have open. If empty, the program serves.
   std::string database_command{};
   std::string backup_file{};  ///< the backup for "restore"
   bool only_check = false;    ///< set by --check-config: end after the configuration was read
   bool only_print = false;    ///< set by --print-config: print the settings in force, and end
-  int exit_status = 0;
 };
 
-/// Reads the command line and the file named by --config. Prints the help, the version and errors
-/// of the command line. Errors: InvalidArgument (INVALID_CONFIGURATION: the file cannot be read, or
-/// a value is out of range).
+/// Reads the command line and the file named by --config. Prints the help and the version. Errors:
+/// InvalidArgument (INVALID_CONFIGURATION: the file cannot be read, or the file or the command line
+/// has an unknown setting or a wrong value).
 absl::StatusOr<CommandLine> ReadCommandLine(int argc, const char* const* argv,
                                             const std::string& version);
 
@@ -85,5 +79,13 @@ std::vector<std::string> DifferentSettings(const Options& first, const Options& 
 
 /// Returns the settings as the text of a configuration file.
 std::string PrintConfiguration(const Options& options);
+
+/// Returns the path of a program in the folder of this executable, or `name` alone on a system
+/// without /proc.
+std::string ProgramBeside(const std::string& name);
+
+/// Returns the same refusal with `place`, which is a line of the configuration file, before its
+/// message.
+absl::Status AtPlace(const absl::Status& status, absl::string_view place);
 
 }  // namespace carillon

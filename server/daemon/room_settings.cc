@@ -8,7 +8,6 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/open_device.h"
-#include "server/daemon/setting_rules.h"
 #include "server/metrics/metrics_address.h"
 
 namespace carillon {
@@ -42,7 +41,6 @@ LocalExecutorOptions LocalExecutorOptionsOf(const Options& options) {
   local.memory_budget_bytes = static_cast<uint64_t>(options.memory_budget_mib) << 20U;
   local.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
   local.time_limit = Milliseconds(options.job_time_s);
-  local.stall_limit = Milliseconds(options.stall_time_s);
   return local;
 }
 
@@ -52,8 +50,7 @@ OutputSettings OutputSettingsOf(const Options& options) {
                      .channel_count = options.channel_count},
           .look_ahead_block_count = options.look_ahead_block_count,
           .device = options.audio_device,
-          .device_program = options.audio_program,
-          .gain = options.gain,
+          .device_program = ProgramBeside("carillon-audio"),
           .full_scale_pa = options.full_scale_pa};
 }
 
@@ -67,7 +64,7 @@ ApiSettings ApiSettingsOf(const Options& options) {
           .version = CARILLON_VERSION,
           .scene_grace_s = options.scene_grace_s,
           .client_share = options.client_share,
-          .slurm = options.executor == "slurm"};
+          .slurm = options.uses_slurm()};
 }
 
 absl::Status CheckRooms(const CommandLine& command) {
@@ -76,7 +73,7 @@ absl::Status CheckRooms(const CommandLine& command) {
     return At(command.places, setting, status);
   };
   RETURN_IF_ERROR(at("data_dir", DataDirectory::Check(options.data_directory)));
-  if (options.executor == "local") {
+  if (!options.uses_slurm()) {
     RETURN_IF_ERROR(at("precompute", CheckLocalExecutor(LocalExecutorOptionsOf(options))));
   }
   RETURN_IF_ERROR(at("audio_device", CheckDevice(options.audio_device)));

@@ -11,6 +11,7 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <string>
 #include <utility>
@@ -23,12 +24,11 @@ namespace {
 constexpr std::chrono::milliseconds kStopLimit(4000);
 constexpr std::chrono::milliseconds kForever(-1);
 constexpr timespec kReloadPeriod{.tv_sec = 1, .tv_nsec = 0};
-constexpr timespec kTidyPeriod{.tv_sec = 5, .tv_nsec = 0};
 
 sigset_t StopSignals() {
   sigset_t signals;
   sigemptyset(&signals);
-  for (const int signal_number : {SIGINT, SIGTERM}) sigaddset(&signals, signal_number);
+  for (const int signal_number : {SIGINT, SIGTERM, SIGQUIT}) sigaddset(&signals, signal_number);
   return signals;
 }
 
@@ -60,8 +60,10 @@ int Await(int first, int second, std::chrono::milliseconds time) {
 void BlockSignals() {
   const sigset_t signals = ServedSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  for (const int signal_number : {SIGUSR1, SIGUSR2}) signal(signal_number, SIG_IGN);
-  signal(SIGPIPE, SIG_IGN);
+  // A timer may have been set by the program that has started this one.
+  for (const int signal_number : {SIGUSR1, SIGUSR2, SIGALRM, SIGPIPE}) {
+    signal(signal_number, SIG_IGN);
+  }
   signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
 }
 
@@ -107,19 +109,17 @@ void StopGuard::EndNow(const std::string& line) const {
   std::_Exit(EXIT_SUCCESS);
 }
 
-void WaitForStop(const std::function<void()>& reload, const std::function<void()>& tidy,
-                 const StopLog& log) {
+void WaitForStop(const std::function<void()>& reload, const StopLog& log) {
   const sigset_t signals = ServedSignals();
   const sigset_t stops = StopSignals();
   int received = 0;
   while (received <= 0) {
-    received = sigtimedwait(&signals, nullptr, &kTidyPeriod);
-    if (received < 0) tidy();
+    received = sigwaitinfo(&signals, nullptr);
     if (received != SIGHUP) continue;
     reload();
     received = sigtimedwait(&stops, nullptr, &kReloadPeriod);
   }
-  log(absl::StrCat("stopping on ", received == SIGINT ? "SIGINT" : "SIGTERM"));
+  log(absl::StrCat("stopping on SIG", sigabbrev_np(received)));
 }
 
 }  // namespace carillon

@@ -14,10 +14,10 @@ using StopLog = std::function<void(const std::string&)>;
 /// only StartGuard and WaitForStop see them. Ignores the signals that must not end the daemon.
 void BlockSignals();
 
-/// Ends the process on SIGINT and SIGTERM while the daemon starts, whatever the start waits for,
-/// and if its stop takes longer than 4 s, for instance because a call computes. Nothing that was
-/// acknowledged is lost: the database is written as for a loss of power. The only thread is made
-/// here, so that a stop needs neither a new thread nor memory.
+/// Ends the process on a signal to stop (SIGINT, SIGTERM, SIGQUIT) while the daemon starts,
+/// whatever the start waits for, and if its stop takes longer than 4 s, for instance because a call
+/// computes. Nothing that was acknowledged is lost: the database is written as for a loss of power.
+/// The only thread is made here, so that a stop needs neither a new thread nor memory.
 class StopGuard {
  public:
   explicit StopGuard(StopLog log);
@@ -45,9 +45,8 @@ class StopGuard {
   std::thread thread_;
 };
 
-/// Returns on SIGINT and SIGTERM. SIGHUP calls `reload`, but at most once a second: signals that
-/// come sooner cause one call together. `tidy` is called every five seconds without a signal.
-void WaitForStop(const std::function<void()>& reload, const std::function<void()>& tidy,
-                 const StopLog& log);
+/// Returns on SIGINT, SIGTERM and SIGQUIT. SIGHUP calls `reload`, but at most once a second:
+/// signals that come sooner cause one call together.
+void WaitForStop(const std::function<void()>& reload, const StopLog& log);
 
 }  // namespace carillon

@@ -30,7 +30,6 @@ KINDS = {
     "good": (0, None),
     "refused": (1, "MESH_NOT_CLOSED"),
     "crashes": (2, "WORKER_CRASHED"),
-    "hangs": (3, "WORKER_STALLED"),
     "eats memory": (4, "OUT_OF_MEMORY"),
     "floods its pipe": (5, "WORKER_GARBAGE"),
     "takes too long": (6, "TIMEOUT"),
@@ -42,7 +41,6 @@ case $((nodes % 10)) in
   0) sleep 0.01; cp "$here/bar.model" "$out" ;;
   1) cat "$here/refusal" >&3; exit 2 ;;
   2) kill -SEGV $$ ;;
-  3) sleep 1000 & wait ;;
   4) x=0123456789abcdef; while :; do x=$x$x; done ;;
   5) while :; do cat "$here/flood" >&3; done ;;
   *) while :; do cat "$here/progress" >&3; sleep 0.1; done ;;
@@ -89,8 +87,7 @@ class JobCampaign(unittest.TestCase):
         (self.folder / "progress").write_bytes(progress)
         (self.folder / "flood").write_bytes(progress * 10_000)
         self.daemon = Daemon(self.folder, "--precompute", scripted.worker(self.folder, WORKER),
-                             "--workers", 4, "--stall-time", 2, "--memory-budget-mib", 2000,
-                             "--job-memory-mib", 60)
+                             "--workers", 4, "--memory-budget-mib", 2000, "--job-memory-mib", 60)
         self.addCleanup(self.daemon.stop)
         self.client = self.daemon.client()
         self.mesh = self.client.upload(meshes.bar())

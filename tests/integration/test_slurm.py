@@ -107,7 +107,7 @@ class SlurmTest(unittest.TestCase):
         self.rng = random.Random(SEED)
 
     def start_daemon(self, *arguments):
-        self.daemon = Daemon(self.folder, "--executor", "slurm", *arguments)
+        self.daemon = Daemon(self.folder, "--slurm-dir", self.folder / "data/slurm", *arguments)
         self.addCleanup(lambda: self.daemon.stop())
 
     def create(self, client, number, **settings):
@@ -164,6 +164,7 @@ case "$PWD $*" in *{self.folder}/data*) exit 9 ;; esac
 exec {worker} "$@"
 """)
         guarded.chmod(0o700)
+        (self.folder / "carillon").symlink_to(BIN / "carillon")  # the nodes look for it beside the worker
         self.start_daemon("--listen", address, "--slurm-upload", address, "--precompute", guarded)
 
     def test_every_model_is_uploaded_once_though_slurmctld_and_the_daemon_are_killed(self):

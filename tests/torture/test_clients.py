@@ -189,7 +189,7 @@ class ClientTest(torture.ServedTest):
         self.create()
 
     def test_a_flood_of_urgent_jobs_does_not_hold_up_another_client(self):
-        tcp = self.serve_over_tcp("--workers", "1", "--queue-limit", "64")
+        tcp = self.serve_over_tcp("--workers", "1")
         mesh_digest = self.client.upload(meshes.bar())
 
         def request(priority, nodes):
@@ -198,7 +198,7 @@ class ClientTest(torture.ServedTest):
                 settings=modal_model_pb2.DecompositionSettings(
                     mesh=modal_model_pb2.MeshSettings(target_node_count=nodes)))
         reason = None
-        for nodes in range(2000, 2064):
+        for nodes in range(2000, 2600):
             try:
                 self.client.models.CreateModalModel(request(100, nodes))
             except grpc.RpcError as error:
@@ -211,8 +211,8 @@ class ClientTest(torture.ServedTest):
         taken_s = time.monotonic() - begin_s
         jobs = self.client.jobs.ListJobs(decomposition_service_pb2.ListJobsRequest()).jobs
         waiting = sum(job.state == decomposition_pb2.JOB_STATE_QUEUED for job in jobs)
-        print(f"a job of priority 0 took {taken_s:.1f} s; {waiting} of 33 jobs of priority 100 wait still", flush=True)
-        self.assertGreater(waiting, 28)
+        print(f"a job of priority 0 took {taken_s:.1f} s; {waiting} of 513 jobs of priority 100 wait still", flush=True)
+        self.assertGreater(waiting, 500)
 
     def test_metrics_count_what_clients_do(self):
         self.serve("--metrics", f"127.0.0.1:{free_port()}")

@@ -15,7 +15,8 @@ import numpy
 
 import torture
 from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc, audio_service_pb2, contact_service_pb2
-from daemon import BIN
+from daemon import BIN, Daemon
+from test_log import namespaces_permitted
 
 STOP_S = 5.0 if torture.LONG else 30.0
 FADE_S = 0.05
@@ -86,7 +87,7 @@ class StopTest(torture.ServedTest):
         configuration.write_text(f'access_file = "{access}"\n')
         self.serve("--config", configuration, "--listen", "127.0.0.1:0")
         address = self.daemon.listening[1].split()[-1]
-        for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
+        for number in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGHUP):
             self.daemon.process.send_signal(number)
         self.assertEqual(self.is_admitted(address, "the first of two tokens"), True)
         write("the second of two tokens")
@@ -97,6 +98,23 @@ class StopTest(torture.ServedTest):
         self.daemon.process.send_signal(signal.SIGHUP)
         torture.wait_until(lambda: "nothing was changed" in (self.folder / "log").read_text(), 30.0)
         self.assertEqual(self.is_admitted(address, "the second of two tokens"), True)
+        self.stop_in_time()
+
+    def test_each_signal_to_stop_fades_and_ends_well(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT):
+            with self.subTest(number=number):
+                self.serve()
+                self.daemon.process.send_signal(number)
+                self.assertEqual(self.daemon.process.wait(STOP_S), 0)
+                self.assertIn(f"stopping on {number.name}\n", (self.folder / "log").read_text())
+
+    @unittest.skipUnless(namespaces_permitted(), "mount namespaces are not permitted here")
+    def test_it_serves_without_proc(self):
+        without_proc = "mount -t tmpfs none /proc && exec \"$@\""
+        self.daemon = Daemon(self.folder, "--precompute", BIN / "carillon-precompute",
+                             prefix=("unshare", "--mount", "--map-root-user", "sh", "-c", without_proc, "sh"))
+        self.addCleanup(self.daemon.kill)
+        self.assertEqual(self.daemon.command("status").returncode, 0)
         self.stop_in_time()
 
     def test_a_storm_of_sighup_reads_the_configuration_once_a_second(self):
