@@ -60,7 +60,7 @@ struct CommandLine {
   Options options;
   SettingPlaces places{};
   bool run = false;  ///< if false, end with success (after --help and --version)
-  /// "check", "repair" or "restore" if the program is to do this to the database, which no daemon
+  /// "check" or "restore" if the program is to do this to the database, which no daemon
   /// may have open. If empty, the program serves.
   std::string database_command{};
   std::string backup_file{};  ///< the backup for "restore"
