@@ -104,6 +104,7 @@ bool FloodGuard::Read(int64_t id, Watched& watched, Clock::time_point now) {
   }
   source.failed_count += calls->failed_count - watched.calls.failed_count;
   source.open_count += calls->open_count();
+  source.most_open_count = std::max(source.most_open_count, calls->open_count());
   ++source.connection_count;
   if (bytes) {
     // The bytes fall if another connection has got the name of one that has just ended.
@@ -123,6 +124,11 @@ bool FloodGuard::Read(int64_t id, Watched& watched, Clock::time_point now) {
 }
 
 std::string FloodGuard::FindFlood(const Source& source, Clock::time_point now) const {
+  if (source.most_open_count > kMaxCallsOfConnection) {
+    return absl::StrCat("it has ", source.most_open_count,
+                        " open calls on one connection, and at most ", kMaxCallsOfConnection,
+                        " are allowed");
+  }
   if (source.open_count > kMaxCallsOfSource) {
     return absl::StrCat("it has ", source.open_count, " open calls on ", source.connection_count,
                         " connections, and at most ", kMaxCallsOfSource, " are allowed");

@@ -16,6 +16,10 @@ namespace carillon {
 /// Greatest number of open calls on all connections of one process (Unix) or address (TCP).
 inline constexpr uint64_t kMaxCallsOfSource = 4096;
 
+/// Greatest number of open calls on one connection. While calls end, gRPC's count of open calls may
+/// exceed gRPC's own limit of 256.
+inline constexpr uint64_t kMaxCallsOfConnection = 512;
+
 /// Greatest number of calls that may fail in a second on all connections of one process or address.
 /// A cancelled call fails, and so does a call that is open when its connection ends.
 inline constexpr uint64_t kMaxFailedCallsPerSecond = 2500;
@@ -70,6 +74,7 @@ class FloodGuard {
   struct Source {
     uint64_t connection_count = 0;
     uint64_t open_count = 0;
+    uint64_t most_open_count = 0;  ///< on one connection
     uint64_t idle_bytes = 0;
     uint64_t failed_count = 0;  ///< since the present second began
   };

@@ -18,7 +18,7 @@ using Acceptor = grpc::experimental::ExternalConnectionAcceptor;
 
 /// Greatest number of open calls on one connection. gRPC makes further calls wait in the client,
 /// but only after the client has confirmed this limit.
-constexpr int kMaxCallsOfConnection = 256;
+constexpr int kMostConcurrentCalls = 256;
 /// Time within which a new connection must send its HTTP/2 settings and, with TLS, complete its
 /// handshake.
 constexpr int kHandshakeLimit_ms = 5'000;
@@ -73,7 +73,7 @@ class GrpcTaker final : public ConnectionTaker {
 
 /// Bounds the resources of each connection, and of all connections of the server together.
 void LimitClients(size_t memory_bytes, grpc::ServerBuilder& builder) {
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMaxCallsOfConnection);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostConcurrentCalls);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimit_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveAnswer_ms);
