@@ -40,8 +40,8 @@ class ConfigurationTest(unittest.TestCase):
                 # An address for documentation, which no machine has (RFC 5737).
                 ({"metrics": "192.0.2.1:9464"}, "LISTEN_FAILED: cannot serve metrics on "
                  "192.0.2.1:9464: Cannot assign requested address; let --metrics name a free port"),
-                ({"metrics": "[::1]:9464"}, "INVALID_CONFIGURATION: metrics is"),
-                ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics is"),
+                ({"metrics": "[::1]:9464"}, "INVALID_CONFIGURATION: metrics: "),
+                ({"metrics": "127.0.0.1:9464,127.0.0.1:9465"}, "INVALID_CONFIGURATION: metrics: "),
                 ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
                 ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
                 ({"tls_key": "/x"}, "INVALID_CONFIGURATION: --tls-certificate and --tls-key must be given together"),
@@ -54,7 +54,7 @@ class ConfigurationTest(unittest.TestCase):
                 ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
                 ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
                 ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
-                ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate is 1"))
+                ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate: "))
 
     def test_what_a_start_would_refuse_is_found_by_the_check_and_ends_with_status_2(self):
         (self.folder / "empty").touch(0o600)

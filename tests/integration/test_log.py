@@ -70,7 +70,7 @@ class LevelTest(unittest.TestCase):
         self.configuration.write_text('log_level = "loud"\n')
         self.daemon.process.send_signal(signal.SIGHUP)
         wait_until(lambda: "nothing was changed by the reload" in self.log())
-        self.assertIn("must be debug, info, warning or error", self.log())
+        self.assertRegex(self.log(), "INVALID_CONFIGURATION: .*log_level")
         self.change_gain(0.25)
         self.assertIn("mixer_changed gain=0.25", self.log())
 
