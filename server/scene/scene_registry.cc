@@ -17,7 +17,8 @@ namespace {
 
 absl::Status SceneNotFound(absl::string_view name) {
   return Refusal(absl::StatusCode::kNotFound, "SCENE_NOT_FOUND",
-                 absl::StrCat("there is no ", name, "; make one with SceneService.CreateScene"));
+                 absl::StrCat("there is no ", name,
+                              "; name one that is there (ListScenes), or make one (CreateScene)"));
 }
 
 ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change) {

@@ -153,7 +153,7 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
   return Refusal(absl::StatusCode::kFailedPrecondition, "TRANSFER_NOT_FOUND",
                  absl::StrCat("no transfer is stored of modalModels/", model.digest,
                               " for a material in which sound travels at ", speed_m_per_s,
-                              " m/s: ask for it with CreateTransfer and let its job succeed"));
+                              " m/s: compute it first (CreateTransfer, carillon transfer --wait)"));
 }
 
 absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& properties,

@@ -57,9 +57,9 @@ absl::Status MissingRole(const Principal& principal, Role role, bool is_anybody)
   if (is_anybody) {
     return Refusal(absl::StatusCode::kUnauthenticated, "CREDENTIAL_MISSING",
                    absl::StrCat(needed,
-                                ": send a token of the daemon's access file in the metadata "
-                                "\"authorization: Bearer TOKEN\", show a client certificate that "
-                                "it names, or come through the daemon's Unix socket"));
+                                ": show a token (\"authorization: Bearer TOKEN\" in the metadata, "
+                                "CARILLON_TOKEN) or a client certificate that the daemon's access "
+                                "file names, or come through the daemon's Unix socket"));
   }
   return Refusal(absl::StatusCode::kPermissionDenied, "ROLE_MISSING",
                  absl::StrCat(needed, ", which ", principal.name,

@@ -101,7 +101,7 @@ absl::Status SceneOwners::Check(const grpc::CallbackServerContext& context, cons
       context, caller.function,
       Refusal(absl::StatusCode::kPermissionDenied, "SCENE_OF_ANOTHER",
               absl::StrCat(scenes_.NameOf(scene), " belongs to another caller than ", caller.name,
-                           ": make a scene with SceneService.CreateScene")));
+                           ": name a scene of your own, or make one (CreateScene)")));
 }
 
 }  // namespace carillon
