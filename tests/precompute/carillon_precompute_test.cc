@@ -164,7 +164,8 @@ TEST_F(CarillonPrecomputeTest, SaysInWordsThatABudgetWasOverrun) {
   EXPECT_THAT(warnings[2], StartsWith("the budget of 0.001 GiB of memory was overrun: "));
   EXPECT_THAT(ReadRecords(model)[0].header().warnings(), ElementsAreArray(warnings));
   // The summary for people has them as well.
-  ASSERT_EQ(Run(bar + " --out " + model + " --element linear --nodes 100 --budget 0.001" + kSteel)
+  ASSERT_EQ(Run(bar + " --out " + model + " --unit mm --element linear --nodes 100 --budget 0.001" +
+                kSteel)
                 .exit_status,
             0);
   EXPECT_THAT(OnStandardError(), HasSubstr("warning: the budget of 0.001 s of processor time"));
