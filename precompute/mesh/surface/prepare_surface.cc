@@ -208,7 +208,9 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   }
   const bool thickens = settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED");
   if (!sound.ok() && !thickens) {
-    return settings.repair ? sound : WithRemediesOfHoles(sound, given);
+    if (!settings.repair) return WithRemediesOfHoles(sound, given);
+    if (IsWallAlready(given)) AddFigure(sound, "wall_helps", "0");
+    return sound;
   }
   if (settings.wall_m > 0) {
     ASSIGN_OR_RETURN(RepairedSurface walled, WithWall(prepared.surface, sound, settings.wall_m));

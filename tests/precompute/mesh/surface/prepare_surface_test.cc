@@ -232,12 +232,12 @@ TEST(PrepareSurface, CornersThatLieCloseTogetherAreJoinedBeforeAWrap) {
   }
 }
 
-/// A cup of 0.1 m with a wall of 4 mm: an outer and an inner surface, closed at the rim, and a hole
-/// through both.
-SurfaceMesh CupWithAHole() {
+/// A cup of 0.1 m with a wall of 4 mm, an outer and an inner surface that meet at the rim, with a
+/// hole and a slit from the rim through both.
+SurfaceMesh CrackedCup() {
+  constexpr int kAround = 48, kAlong = 12, kSlit = 20;
   const auto cup = [](double radius_m, double from_m, bool outward) {
     SurfaceMesh side;
-    constexpr int kAround = 48, kAlong = 12;
     for (int k = 0; k <= kAlong; ++k) {
       for (int i = 0; i < kAround; ++i) {
         const double angle = 2 * kPi * i / kAround;
@@ -250,7 +250,7 @@ SurfaceMesh CupWithAHole() {
         const int next = (i + 1) % kAround;
         const int32_t a = k * kAround + i, b = k * kAround + next;
         const int32_t c = a + kAround, d = b + kAround;
-        if (k >= 5 && k < 7 && i < 4) continue;  // the hole
+        if ((k >= 5 && k < 7 && i < 4) || (k >= 5 && i == kSlit)) continue;
         side.triangles.push_back({a, b, d});
         side.triangles.push_back({a, d, c});
       }
@@ -264,15 +264,24 @@ SurfaceMesh CupWithAHole() {
     return side;
   };
   SurfaceMesh both = cup(0.05, 0, true);
+  const auto inner = static_cast<int32_t>(both.vertices.size());
   AddShell(both, cup(0.046, 0.004, false), {0, 0, 0});
+  for (int32_t i = 0; i < kAround; ++i) {
+    if (i == kSlit) continue;
+    const int32_t a = kAlong * kAround + i, b = kAlong * kAround + (i + 1) % kAround;
+    both.triangles.push_back({a, b, b + inner});
+    both.triangles.push_back({a, b + inner, a + inner});
+  }
   return both;
 }
 
 TEST(PrepareSurface, AWallIsNotAdvisedAndRefusedWhereTheSurfaceHasTwoSides) {
-  const SurfaceMesh cup = CupWithAHole();
+  const SurfaceMesh cup = CrackedCup();
   const absl::Status open = PrepareSurface(cup, {}).status();
   EXPECT_THAT(open.ToString(), HasSubstr("MESH_NOT_CLOSED"));
   EXPECT_EQ(ToErrorInfo(open).metadata().at("wall_helps"), "0");
+  const absl::Status repaired = PrepareSurface(cup, {.repair = true}).status();
+  EXPECT_EQ(ToErrorInfo(repaired).metadata().at("wall_helps"), "0") << repaired;
   EXPECT_THAT(PrepareSurface(cup, {.wall_m = 0.0028}).status().ToString(),
               HasSubstr("has both sides of its wall already"));
 }
