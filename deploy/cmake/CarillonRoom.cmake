@@ -13,9 +13,9 @@ function(carillon_unity target)
   set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# Optimizes a target for its build: its code runs once a call, not once a row, a sample or an element, and most of a build
-# went into reading and optimizing gRPC's and CLI11's templates. Reading them takes four fifths of the time that is left,
-# so more files share it.
+# Optimizes a target for its build: its code runs once a call, not once a row, a sample or an element. Most of a build
+# went into reading and optimizing gRPC's and CLI11's templates; reading them takes four fifths of the time that is
+# left, so more files share it.
 function(carillon_once_a_call target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 12)

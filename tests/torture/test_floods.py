@@ -117,7 +117,8 @@ class FloodTest(torture.ServedTest):
         return (self.folder / "log").read_text()
 
     def test_calls_that_are_cancelled_at_once(self):
-        self.assertRegex(self.attack(resets), "closed . connections of unix:pid-.* and refuses new ones for 30 s: it has")
+        self.assertRegex(self.attack(resets),
+                         "closed . connections of unix:pid-.* and refuses new ones for 30 s: it has")
 
     def test_calls_that_never_send_their_message(self):
         self.assertIn("open calls on", self.attack(unfinished))
