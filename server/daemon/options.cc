@@ -103,8 +103,11 @@ const std::vector<Setting>& Settings() {
   using O = Options;
   static const std::vector<Setting> settings = {
       {"listen", &O::addresses,
-       "address to serve: unix:PATH or HOST:PORT (port 0: any free port); repeatable", Any},
-      {"data_dir", &O::data_directory, "folder of the database", SomeFolder},
+       "address to serve: unix:PATH or HOST:PORT (port 0: any free port); repeatable [a socket in "
+       "$RUNTIME_DIRECTORY or $XDG_RUNTIME_DIR]",
+       Any},
+      {"data_dir", &O::data_directory,
+       "folder of the database [$STATE_DIRECTORY, or carillon in $XDG_STATE_HOME]", SomeFolder},
       {"access_file", &O::access_file,
        "file that says who may do what over TCP, by tokens and clients' certificates", Any},
       {"tls_certificate", &O::tls_certificate_file, "PEM file with the certificate for TCP", Any},
@@ -147,7 +150,8 @@ const std::vector<Setting>& Settings() {
        "space for stored models: beyond it the least recently sounded models are deleted, but "
        "never the newest, a sounding or a pinned one; 0: no limit",
        Between(0, kMostMib)},
-      {"precompute", &O::precompute_program, "path of the program that computes decompositions",
+      {"precompute", &O::precompute_program,
+       "path of the program that computes decompositions [carillon-precompute beside carillond]",
        Any},
       {"slurm_dir", &O::slurm_directory,
        "folder shared with the nodes of a Slurm cluster, to which sbatch submits the "
@@ -218,11 +222,8 @@ void AddFlag(CLI::App& app, Options& options, const Setting& setting) {
           option = app.add_option(flag, value, setting.help)->check(setting.check);
         }
         if constexpr (std::is_same_v<Value, Texts>) option->take_all();
-        // An empty text is no default that anybody could write.
-        if constexpr (std::is_same_v<Value, std::string>) {
-          if (value.empty()) return;
-        }
-        option->capture_default_str();
+        // A default that depends on the machine is described by the help, in brackets.
+        if (!absl::EndsWith(setting.help, "]")) option->capture_default_str();
       },
       setting.member);
 }
