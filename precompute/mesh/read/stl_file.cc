@@ -55,11 +55,17 @@ class StlText {
 
   absl::StatusOr<SurfaceFile> Parse() && {
     file_.has_numbers = false;
+    bool has_ended = false;
     for (std::string word = Next(); !word.empty(); word = Next()) {
       if (word == "facet") {
         RETURN_IF_ERROR(ReadFacet());
       } else if (word == "solid" || word == "endsolid") {
         stream_.SkipLine();  // the name
+        has_ended = word == "endsolid";
+      } else if (has_ended && absl::AsciiStrToLower(std::string(stream_.rest())).find("facet") ==
+                                  std::string::npos) {
+        file_.warnings.emplace_back("what follows the last solid of the file was left out");
+        break;
       } else {
         return Fault(
             absl::StrCat(QuotedText(word), " where a facet or the end of the solid belongs"));

@@ -68,6 +68,19 @@ TEST_F(HoldTest, PlaneHoldsWhatLiesInItAndBehindIt) {
               HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the plane"));
 }
 
+// The reader counts the places of such a body from (4090, 0, 0).
+TEST_F(HoldTest, RegionsOfABodyFarAwayCountFromTheOriginOfTheFile) {
+  TetMesh far_box = MakeTetBox(kSize, {4, 2, 2}, 10);
+  for (Point& p : far_box.nodes) p[0] += 4096;
+  const TetMesh face = Held(ToBinaryGmsh(far_box), "msh", {FixedPlane{{4096, 9, 9}, {3, 0, 0}}});
+  EXPECT_THAT(face.held, ::testing::Not(::testing::IsEmpty()));
+  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return p[0] == 6; }));
+  const TetMesh part =
+      Held(ToBinaryGmsh(far_box), "msh", {FixedBox{{4096.5, 0, 0}, {4098, 0.25, 2}}});
+  EXPECT_EQ(part.held,
+            NodesWhere(part, [](const Point& p) { return p[0] >= 6.5 && p[1] <= 0.25; }));
+}
+
 TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
   const TetMesh mesh = Held(box, "msh", {FixedBox{{0.5, 0, 0}, {2, 0.25, 2}}});
@@ -151,7 +164,7 @@ TEST_F(HoldTest, GroupOfAnObjFileHoldsItsFaces) {
 TEST_F(HoldTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
   Held(kGroupedObj, "obj", {FixedGroup{"bottom"}});
   EXPECT_THAT(status.ToString(), HasSubstr("GROUP_UNKNOWN: the mesh file has no group \"bottom\": "
-                                           "it has base, body, ends, top"));
+                                           "it has \"base\", \"body\", \"ends\", \"top\""));
   Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedGroup{"base"}});
   EXPECT_THAT(status.ToString(), HasSubstr("it names none; fix a plane or a box"));
 }
@@ -180,7 +193,8 @@ TEST_F(HoldTest, PhysicalGroupHoldsItsElementsWithTheirMidsideNodes) {
   const TetMesh numbered = Held(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {FixedGroup{"9"}});
   EXPECT_EQ(numbered.held, NodesWhere(numbered, base));
   Held(GmshWithABase("0\n"), "msh", {FixedGroup{"7"}});
-  EXPECT_THAT(status.ToString(), HasSubstr("it has 5, 9")) << "a volume's number is a material's";
+  EXPECT_THAT(status.ToString(), HasSubstr("it has \"5\", \"9\""))
+      << "a volume's number is a material's";
 }
 
 TEST_F(HoldTest, BodyHeldAllOverIsRefused) {

@@ -147,6 +147,7 @@ TEST_F(ReadVariantsTest, TextStlMayBeInCapitalsAndHaveSeveralSolids) {
   const size_t middle = stl.find("endfacet", stl.size() / 2) + 8;
   ExpectBox(stl.substr(0, middle) + "\nendsolid one\nsolid facet two\n" + stl.substr(middle),
             "stl");
+  ExpectBox(stl + "\x1a", "stl");  // ends texts of DOS
   EXPECT_THAT(Refused(absl::StrReplaceAll(stl, {{"vertex 0 ", "vertex 0,0 "}}), "stl"),
               AllOf(HasSubstr("MESH_UNREADABLE"), HasSubstr("no vertex")));
 }
