@@ -13,8 +13,6 @@ CLASS = re.compile(r"^ *(?:template <[^;{]*> *)?(?:class|struct)(?: [A-Z_]+(?:\(
 MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?:\w+::)*~?\w+\(", re.M)
 APART = {
     "server/mode_database/model_collection.cc",
-    "server/synthesis/bank/oscillator_bank_setup.cc",
-    "server/synthesis/bank/oscillator_bank_strikes.cc",
     "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
     "client_sdk/cpp/internal/grpc_client_runs.cc", "client_sdk/cpp/internal/grpc_client_streams.cc",
 }

@@ -35,6 +35,13 @@ struct LanePlan {
     return (lanes[part].size() + kMostLanes - 1) / kMostLanes * kMostLanes;
   }
 
+  /// Number of lanes of all padded parts.
+  size_t PaddedCount() const {
+    size_t count = 0;
+    for (size_t part = 0; part < lanes.size(); ++part) count += PaddedCount(part);
+    return count;
+  }
+
   /// Returns the lanes of a padded part that are rendered in tiles of this kind. The slower a mode
   /// oscillates, the longer are its tiles. Part 0 always uses the shortest tiles.
   LaneRange Tiled(size_t part, size_t tile_kind) const;

@@ -16,6 +16,7 @@
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/bank/directed_gains.h"
 #include "server/synthesis/bank/level.h"
+#include "server/synthesis/bank/long_segment.h"
 #include "server/synthesis/bank/shape_table.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/bank/sustained_force.h"
@@ -25,7 +26,6 @@
 #include "server/synthesis/ringing/strike_kernel.h"
 #include "server/synthesis/schedule/due_event.h"
 #include "server/synthesis/schedule/mixer_event.h"
-#include "server/synthesis/spectrum/spectral_lanes.h"
 
 namespace carillon {
 
@@ -192,18 +192,6 @@ class OscillatorBank {
   size_t mode_count() const noexcept { return mode_count_; }
 
  private:
-  /// Lanes that can ring by spectrum, in long blocks of one kind.
-  struct LongSegment {
-    SpectralLanes lanes;
-    size_t mode_count = 0;
-    size_t block_count = 1;  // of the mixer, in a long block
-    double loudest_squared = 0;
-    bool awake = false;
-    bool sounding = false;       // in the current long block
-    bool struck = false;         // since the current long block began
-    uint32_t struck_streak = 0;  // consecutive long blocks in which it was struck
-  };
-
   /// How far the bank has come in the current block:
   ///
   ///             BeginBlock         first onset         a part must be rendered
@@ -240,8 +228,6 @@ class OscillatorBank {
 
   void BeginBlock(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   bool BeginLongBlock(size_t kind, BlockMix& mix) noexcept;
-  void MoveToSpectrum(size_t kind) noexcept;
-  void MoveToTime(size_t kind) noexcept;
   std::optional<strike_kernel::Projection> Project(
       const TrianglePoint& at, const std::array<float, 3>& vector) const noexcept;
   void AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
@@ -250,7 +236,6 @@ class OscillatorBank {
   bool RenderModesInTime(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderAcceleration(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void SetSegments(const LanePlan& plan);
-  void MeasureLoudness(const LanePlan& plan);
   double TimeWork(size_t lane_count) const noexcept;
   void SetDirectivity(const SoundingModes& sounding, const LanePlan& plan,
                       const OscillatorBankSettings& settings);
