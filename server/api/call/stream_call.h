@@ -54,7 +54,7 @@ class StreamReader : public Reactor {
  public:
   void OnReadDone(bool ok) final {
     if (!GoesOn()) return;
-    if (ok) return RunReading([this] { ReadRequest(); });
+    if (ok) return RunReading(bytes_.Length(), [this] { ReadRequest(); });
     this->Run([this] {
       Continue([this] {
         AllRead();
@@ -79,10 +79,10 @@ class StreamReader : public Reactor {
 
   virtual void Refuse(const absl::Status& status) { this->End(status); }
 
-  /// Runs the step that parses a request and takes it. A call may choose other threads than those
-  /// of its pool. Requests are still taken one at a time and in order, because the next request is
-  /// read after the last step.
-  virtual void RunReading(std::function<void()> step) { this->Run(std::move(step)); }
+  /// Runs the step that parses a request of this size and takes it. A call may choose other threads
+  /// than those of its pool. Requests are still taken one at a time and in order, because the next
+  /// request is read after the last step.
+  virtual void RunReading(size_t, std::function<void()> step) { this->Run(std::move(step)); }
 
   /// Returns false if the call was ended while it waited for a request. The call may then be
   /// deleted as soon as GoesOn returns, so no step may be left to the pool. Called on gRPC's

@@ -28,6 +28,10 @@ constexpr std::chrono::milliseconds kAnswerPeriod(500);
 /// ends after kMostSettlePeriods, in case the mixer does not render at all.
 constexpr std::chrono::milliseconds kSettlePeriod(2);
 constexpr int kMostSettlePeriods = 250;
+/// Greatest size of a message that gRPC's thread parses and takes at once. Such a message takes up
+/// to 2 ms. gRPC has few threads, and all calls wait while these are busy. If another thread took
+/// each message of one impulse, a stream would take a third fewer of them in a second.
+constexpr size_t kMostBytesAtOnce = size_t{4} << 10;
 
 /// One contact stream. Requests are read one at a time, so only one thread at a time uses
 /// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
@@ -64,7 +68,8 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   bool gone() const override { return context_.IsCancelled(); }
 
-  void RunReading(std::function<void()> step) override {
+  void RunReading(size_t byte_count, std::function<void()> step) override {
+    if (byte_count <= kMostBytesAtOnce) return step();
     daemon_.steps.Run(caller_.client, std::move(step));
   }
 
