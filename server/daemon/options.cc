@@ -139,7 +139,7 @@ const std::vector<Setting>& Settings() {
       {"workers", &O::worker_count, "decompositions that run at a time; 0: half of the processors",
        Between(0, 1024)},
       {"memory_budget_mib", &O::memory_budget_mib,
-       "memory of all decompositions together; 0: half of the machine's", Between(0, kMostMib)},
+       "memory of all decompositions together; 0: half of what the daemon may use", Between(0, kMostMib)},
       {"job_memory_mib", &O::job_memory_mib, "memory of one decomposition; 0: the whole budget",
        Between(0, kMostMib)},
       {"job_time", &O::job_time_s, "seconds that a decomposition may take",

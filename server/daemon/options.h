@@ -25,7 +25,7 @@ struct Options {
   double full_scale_pa = kFullScalePa;
   std::string head_file;          ///< SOFA file for binaural scenes; if empty, libmysofa1's
   int worker_count = 0;           ///< decompositions at a time; 0 means half of the processors
-  int64_t memory_budget_mib = 0;  ///< memory of all decompositions; 0 means half of the machine's
+  int64_t memory_budget_mib = 0;  ///< memory of all decompositions; 0: half of UsableMemoryBytes
   int64_t job_memory_mib = 0;     ///< memory of one decomposition; 0 means the whole budget
   double job_time_s = 21600;
   bool transfers = true;           ///< compute a transfer after each model
