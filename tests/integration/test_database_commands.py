@@ -212,11 +212,11 @@ class DatabaseCommandsTest(unittest.TestCase):
 
     def test_what_sqlite_can_read_is_recovered(self):
         """By the commands of docs/operations.md for a damaged file without a backup."""
-        self.import_copies(40)
+        self.import_copies(20)
         self.daemon.stop()
         data = self.folder / "data"
         file = data / "carillon.db"
-        os.truncate(file, file.stat().st_size * 3 // 4)
+        os.truncate(file, file.stat().st_size // 2)
         self.assertEqual(self.offline("check").returncode, 1)
         page = (ROOT / "docs/operations.md").read_text()
         repair = page[page.index("### Repair"):]
@@ -227,13 +227,12 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertNotIn("structure: ", checked.stdout)
         self.daemon.start()
         whole_count = 0
-        for number in range(40):
+        for number in range(20):
             exported = self.daemon.command("model", "export", f"copy {number}", "--out", self.folder / "out.model",
                                            check=False)
             whole_count += exported.returncode == 0
-        print(f"{whole_count} of 40 models are recovered from three quarters of the file", flush=True)
-        self.assertGreater(whole_count, 10)
-        self.assertLess(whole_count, 40)
+        print(f"{whole_count} of 20 models are recovered from half of the file", flush=True)
+        self.assertGreater(whole_count, 5)
 
     def test_a_folder_without_a_database_is_told_and_nothing_is_made_in_it(self):
         other = self.folder / "other"
