@@ -24,9 +24,15 @@ constexpr int64_t kBodyStride = int64_t{1} << 40;
 class BodyJoiner {
  public:
   explicit BodyJoiner(const std::vector<InpBody>& bodies) : bodies_(bodies) {
-    for (const InpBody& body : bodies) {
-      for (const InpScope::Set& set : body.scope.sets) ++owners_[InpName(set.name)];
+    size_t solid_count = 0;
+    for (size_t b = 0; b < bodies.size(); ++b) {
+      for (const InpScope::Set& set : bodies[b].scope.sets) ++owners_[InpName(set.name)];
+      const bool is_solid = std::ranges::any_of(bodies[b].scope.elements, [](const auto& element) {
+        return element.kind.dimension == 3;
+      });
+      if (is_solid && solid_count++ == 0) numbered_ = b;
     }
+    keeps_numbers_ = bodies.size() == 1 || solid_count == 1;
   }
 
   absl::StatusOr<ElementFile> Join(const std::vector<InpAssemblySet>& sets) && {
@@ -46,7 +52,8 @@ class BodyJoiner {
   };
 
   int64_t NumberOf(size_t b, int64_t number) const {
-    return bodies_.size() == 1 ? number : number + (static_cast<int64_t>(b) + 1) * kBodyStride;
+    const bool keeps_number = keeps_numbers_ && b == numbered_;
+    return keeps_number ? number : number + (static_cast<int64_t>(b) + 1) * kBodyStride;
   }
 
   absl::Status AddBody(size_t b) {
@@ -138,6 +145,8 @@ class BodyJoiner {
   }
 
   const std::vector<InpBody>& bodies_;
+  bool keeps_numbers_ = false;         // whether one body's nodes keep their numbers:
+  size_t numbered_ = 0;                // the only one, or the only one with tetrahedra
   std::map<std::string, int> owners_;  // number of bodies with a set of that name
   std::set<std::string> is_of_assembly_;
   std::vector<std::vector<Placed>> placed_;

@@ -62,8 +62,8 @@ struct InpAssemblySet {
 };
 
 /// Joins bodies to one file of elements, each where it is placed. Nodes of different bodies stay
-/// apart. The nodes of a single body keep their numbers. A set that several bodies have is named
-/// "INSTANCE.SET".
+/// apart. The nodes of a single body, or of the only one with tetrahedra, keep their numbers. A set
+/// that several bodies have is named "INSTANCE.SET".
 ///
 /// Errors: MESH_INDEX_OUT_OF_RANGE, MESH_ELEMENT_UNSUPPORTED (sections of several materials).
 absl::StatusOr<ElementFile> JoinBodies(std::vector<InpBody> bodies,

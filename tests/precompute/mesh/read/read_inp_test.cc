@@ -102,6 +102,19 @@ TEST_F(ReadInpTest, APartThatNoInstancePlacesIsNotThere) {
   EXPECT_EQ(mesh.element_count(), 1U);
 }
 
+// A tool of rigid faces beside the body has numbers of its own.
+TEST_F(ReadInpTest, TheOnlySolidInstanceKeepsItsNumbers) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      Part("Bar") +
+          "*PART, NAME=Tool\n*NODE\n1, 5,5,5\n2, 6,5,5\n3, 5,6,5\n*ELEMENT, TYPE=R3D3\n1, 1,2,3\n"
+          "*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=T, PART=Tool\n*END INSTANCE\n"
+          "*INSTANCE, NAME=B, PART=Bar\n*END INSTANCE\n*END ASSEMBLY\n",
+      "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->names.vertices.at(2), (Point{1, 0, 0}));
+  EXPECT_THAT(read->warnings, ElementsAre(HasSubstr("1 triangles of the file have nodes")));
+}
+
 TEST_F(ReadInpTest, ASetMayComeBeforeItsElements) {
   const absl::StatusOr<NamedMesh> read =
       ReadNamed(std::string("*ELSET, ELSET=\"a, b\"\n1,\n") + kNodes + kElement, "inp");

@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "absl/strings/str_cat.h"
+
 namespace carillon {
 namespace {
 
@@ -14,9 +16,11 @@ TEST(QuotedText, BytesThatATerminalWouldObeyOrThatAreNoUtf8AreWrittenInHexadecim
 }
 
 TEST(QuotedText, LongTextsAreCutBetweenCharacters) {
-  EXPECT_EQ(QuotedText(std::string(100'000, 'x')), "\"" + std::string(60, 'x') + "...\"");
+  EXPECT_EQ(QuotedText(std::string(100'000, 'x')),
+            absl::StrCat("\"", std::string(60, 'x'), "...\""));
   // The character of two bytes would end at byte 61.
-  EXPECT_EQ(QuotedText(std::string(59, 'x') + "\xC3\xBC"), "\"" + std::string(59, 'x') + "...\"");
+  EXPECT_EQ(QuotedText(absl::StrCat(std::string(59, 'x'), "\xC3\xBC")),
+            absl::StrCat("\"", std::string(59, 'x'), "...\""));
 }
 
 }  // namespace
