@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "server/base/clock.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
@@ -33,6 +35,22 @@ TEST_F(ConnectionCallsTest, AreCountedByConnection) {
     begun.push_back(ReadConnectionCalls(connection.id).value_or(ConnectionCalls{}).begun_count);
   }
   EXPECT_THAT(begun, testing::Contains(4));
+}
+
+/// A guard beside that of the daemon, of which it sees the connections, too.
+class FloodGuardTest : public ServedDaemon {
+ protected:
+  SystemClock clock_;
+  LimitedLog log_{clock_, "clients", [](const std::string&) {}};
+  ConnectionGate gate_{8};
+  FloodGuard guard_{gate_, log_};
+};
+
+TEST_F(FloodGuardTest, RestsUntilSomebodyIsConnectedAndThenLooksTwentyTimesASecond) {
+  EXPECT_TRUE(guard_.rests());
+  CreateScene();
+  EXPECT_GE(guard_.Look(), FloodGuard::kPeriod);
+  EXPECT_FALSE(guard_.rests());
 }
 
 }  // namespace
