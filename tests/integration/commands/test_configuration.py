@@ -75,7 +75,7 @@ class ConfigurationTest(unittest.TestCase):
         for settings in ({}, {"listen": ["127.0.0.1:0", "127.0.0.1:0"]}, {"metrics": "localhost:9464"},
                          {"listen": ["127.0.0.1:0"]}, {"listen": [f"unix:{self.folder}/a/b/socket"]},
                          {"data_dir": f"{self.folder}/a/b/c"}, {"audio_device": f"file:{self.folder}/a.wav"},
-                         {"executor": "slurm", "precompute": "/on/each/node"}):
+                         {"slurm_dir": "/on/each/node", "precompute": "/on/each/node/precompute"}):
             with self.subTest(settings=settings):
                 checked = self.run_daemon(settings, "--check-config")
                 self.assertEqual((checked.returncode, checked.stdout), (0, "the configuration is valid\n"),
