@@ -46,8 +46,8 @@ class JackServer {
 /// Everything that listeners are given from now on.
 class Recorder {
  public:
-  explicit Recorder(BlockBroadcast& broadcast)
-      : listener_(*broadcast.Subscribe([this] { Drain(); })) {
+  explicit Recorder(LiveOutput& output)
+      : listener_(*output.Listen(std::nullopt, [this] { Drain(); })) {
     const std::lock_guard lock(mutex_);
     listening_ = listener_.get();
   }
@@ -113,7 +113,7 @@ TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
   EXPECT_THAT((*output)->state().device, testing::HasSubstr("JACK"));
   // The look-ahead, and the two periods that JACK says lie between its clients and the ear.
   EXPECT_DOUBLE_EQ((*output)->state().latency_s, 10 * 128 / 48000.0);
-  Recorder recorder((*output)->broadcast());
+  Recorder recorder(**output);
   SceneRegistry scenes((*output)->mixer());
   StrikeForAWhile(scenes);
   const std::string file = folder / "capture.wav";
