@@ -135,11 +135,13 @@ bool LiveOutput::MayPause() const {
 }
 
 void LiveOutput::Pause() {
+  // Blocks that are rendered while the threads stop count as rendered in the pause.
+  paused_at_ = clock_.Monotonic();
+  paused_frame_ = mixer_.frame();
   if (!keeper_->Pause()) return;
   look_ahead_.Stop();
   paused_ = true;
-  paused_at_ = clock_.Monotonic();
-  paused_frame_ = mixer_.frame();
+  Deliver();  // a later listener gets no block from before the pause
 }
 
 void LiveOutput::Resume() {
@@ -151,17 +153,22 @@ void LiveOutput::Resume() {
 }
 
 /// Renders the blocks that the device would have asked for meanwhile. They are silent until an
-/// event comes, which a stream that opens announces before.
+/// event comes, which a stream that opens announces before. A listener that comes just now hears
+/// them.
 void LiveOutput::RenderDueSilence() {
   const DeviceFormat& format = settings_.format;
   const std::chrono::duration<double> elapsed = clock_.Monotonic() - paused_at_;
   const auto due_count =
       static_cast<uint64_t>(elapsed.count() * format.sample_rate_hz) / format.block_frame_count;
-  uint64_t block_count = due_count - (mixer_.frame() - paused_frame_) / format.block_frame_count;
-  while (block_count > 0) {
-    const size_t together = std::min<uint64_t>(block_count, kBlocksTogether);
-    mixer_.Render(std::span(silence_).first(together * format.block_size()));
-    block_count -= together;
+  const uint64_t done_count = (mixer_.frame() - paused_frame_) / format.block_frame_count;
+  const bool heard = broadcast_.listener_count() > 0;
+  for (uint64_t left = due_count - std::min(done_count, due_count); left > 0;) {
+    const size_t together = heard ? 1 : std::min<uint64_t>(left, kBlocksTogether);
+    const std::span<float> blocks = std::span(silence_).first(together * format.block_size());
+    const uint64_t first_frame = mixer_.frame();
+    mixer_.Render(blocks);
+    if (heard) broadcast_.Publish(first_frame, blocks);
+    left -= together;
   }
 }
 
@@ -212,8 +219,7 @@ void LiveOutput::KeepHouse() {
   std::chrono::nanoseconds levels_due = clock_.Monotonic();
   std::chrono::nanoseconds losses_due = levels_due + kLossPeriod;
   while (!stopping_) {
-    broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
-    stems_.Deliver();
+    Deliver();
     mixer_.CollectGarbage();
     const std::chrono::nanoseconds now = clock_.Monotonic();
     if (now >= levels_due) {
@@ -231,6 +237,11 @@ void LiveOutput::KeepHouse() {
       clock_.SleepUntil(clock_.Monotonic() + (heard ? kHousekeepingPeriod : kUnheardPeriod));
     }
   }
+}
+
+void LiveOutput::Deliver() {
+  broadcast_.Deliver([this](const RenderedBlock& block) { loudness_.Add(block.samples); });
+  stems_.Deliver();
 }
 
 void LiveOutput::NoteLevels() {

@@ -128,6 +128,7 @@ class LiveOutput {
   void Resume() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
   void RenderDueSilence() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
   void KeepHouse();
+  void Deliver();
   void NoteLevels();
   void NoteLosses();
 

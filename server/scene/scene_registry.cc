@@ -369,6 +369,7 @@ absl::Status SceneRegistry::AwaitRoomForMoves(Scene& scene, size_t count) {
   if (moves == nullptr) {
     ASSIGN_OR_RETURN(moves, mixer_.OpenStream(kMaxObjectCount, StreamKind::kMoves));
   }
+  if (moves->room() < count) mixer_.Wake();
   // The mixer takes thousands of events in each block.
   constexpr absl::Duration kLongest = absl::Milliseconds(200), kPause = absl::Microseconds(500);
   for (absl::Duration waited; moves->room() < count; waited += kPause) {

@@ -170,7 +170,7 @@ absl::StatusOr<BankId> Mixer::Add(std::unique_ptr<OscillatorBank> bank,
 
 absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, StreamKind kind) {
   auto stream = owner_.OpenStream(capacity, kind);
-  if (stream.ok() && settings_.wake && kind != StreamKind::kMoves) settings_.wake();
+  if (stream.ok() && kind != StreamKind::kMoves) Wake();
   return stream;
 }
 

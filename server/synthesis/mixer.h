@@ -107,6 +107,11 @@ class Mixer {
   /// and no contact stream was open.
   bool resting() const noexcept { return resting_.load(std::memory_order_relaxed); }
 
+  /// Lets whoever pauses rendering begin again.
+  void Wake() const {
+    if (settings_.wake) settings_.wake();
+  }
+
   /// Number of the next frame to be rendered.
   uint64_t frame() const noexcept { return counters_.frame_count.load(); }
 
