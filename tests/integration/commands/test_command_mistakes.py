@@ -27,6 +27,7 @@ class MessagesTest(CommandLineTest):
         self.run_command("model", "create", self.folder / "bar.obj", "--material", meshes.MATERIAL, "--nodes", 60000,
                          "--label", "long", "--no-wait")
         self.run_command("job", "cancel", "long")
+        self.daemon.command("job", "watch", "long", check=False)  # until its worker has ended
         for job, expected in (("long", "been cancelled"), ("bar", "succeeded")):
             again = self.daemon.command("--json", "job", "cancel", job, check=False)
             self.assertEqual(again.returncode, 1)
