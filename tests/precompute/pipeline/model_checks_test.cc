@@ -59,9 +59,9 @@ TEST(IsSurelyAboveBand, TheLowestModeMustLieAboveByMoreThanTwiceItsError) {
   EXPECT_FALSE(IsSurelyAboveBand(ModelWith({2 * kHighHz}, {0}), Use())) << "it has a mode";
 }
 
-TEST(MayBeTooSmall, ACubeOfAMillimetreMayBeAndOneOfAMetreMayNot) {
+TEST(MayBeTooSmall, ACubeOfAMillimetreMayBeAndOneOfTenMetresMayNot) {
   EXPECT_TRUE(MayBeTooSmall(MakeBoxSurface({1e-3, 1e-3, 1e-3}), Use()));
-  EXPECT_FALSE(MayBeTooSmall(MakeBoxSurface({1, 1, 1}), Use()));
+  EXPECT_FALSE(MayBeTooSmall(MakeBoxSurface({10, 10, 10}), Use()));
   EXPECT_FALSE(MayBeTooSmall(MakeBoxSurface({1e-3, 1e-3, 1e-6}), Use())) << "it is no compact body";
 }
 

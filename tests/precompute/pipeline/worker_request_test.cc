@@ -19,6 +19,8 @@ v1::WorkerRequest Steel() {
   request.mutable_material()->set_young_pa(210e9);
   request.mutable_material()->set_poisson_ratio(0.3);
   request.mutable_material()->set_density_kg_per_m3(7850);
+  request.mutable_material()->set_alpha1_s(0);
+  request.mutable_material()->set_alpha2_per_s(0);
   return request;
 }
 
