@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "precompute/fem/held_nodes.h"
+#include "precompute/sparse/openblas.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -111,6 +112,8 @@ absl::StatusOr<Modes> SolveWithSpectra(const SystemMatrices& system, const ModeR
   const auto [count, limit] = request;
   if (count >= system.unknown_count()) return TooFewUnknowns(system, count);
   const int basis_size = std::min(static_cast<int>(system.unknown_count()), 2 * count + 30);
+  // Threads gain nothing in a solve of one vector, and wait for each other on a busy machine.
+  const ScopedBlasThreads one_thread(1);
   using MassProduct = Spectra::SparseSymMatProd<double, Eigen::Lower>;
   try {
     ShiftedInverse inverse(system);
