@@ -216,7 +216,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.daemon.stop()
         data = self.folder / "data"
         file = data / "carillon.db"
-        os.truncate(file, file.stat().st_size // 2)
+        os.truncate(file, file.stat().st_size * 3 // 4)
         self.assertEqual(self.offline("check").returncode, 1)
         page = (ROOT / "docs/operations.md").read_text()
         repair = page[page.index("### Repair"):]
@@ -231,7 +231,7 @@ class DatabaseCommandsTest(unittest.TestCase):
             exported = self.daemon.command("model", "export", f"copy {number}", "--out", self.folder / "out.model",
                                            check=False)
             whole_count += exported.returncode == 0
-        print(f"{whole_count} of 20 models are recovered from half of the file", flush=True)
+        print(f"{whole_count} of 20 models are recovered from three quarters of the file", flush=True)
         self.assertGreater(whole_count, 5)
 
     def test_a_folder_without_a_database_is_told_and_nothing_is_made_in_it(self):
