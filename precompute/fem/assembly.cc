@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "precompute/fem/curved_element.h"
-#include "precompute/fem/held_nodes.h"
+#include "precompute/fem/moving_nodes.h"
 #include "precompute/mesh/curved_edges.h"
 
 namespace carillon::precompute {
@@ -199,7 +199,7 @@ SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
                  MakeQuadraticMass(geometry.volume_m3, density_kg_per_m3, sharing), system);
     }
   }
-  if (mesh.held.empty()) return system;
+  if (mesh.fixed.empty()) return system;
   return Restricted(system, MovingNodes(mesh));
 }
 

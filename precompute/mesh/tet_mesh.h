@@ -35,7 +35,7 @@ struct TetMesh {
   std::vector<int32_t> elements;
   std::vector<BoundaryFace> boundary;
   /// Fixed nodes, ascending; empty if the body is free.
-  std::vector<int32_t> held = {};
+  std::vector<int32_t> fixed = {};
 
   size_t element_count() const { return elements.size() / static_cast<size_t>(nodes_per_element); }
 };

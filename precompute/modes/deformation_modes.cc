@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "precompute/eigen/block_lanczos_eigensolver.h"
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/fem/held_nodes.h"
+#include "precompute/fem/moving_nodes.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/modes/lower_limit.h"
 #include "precompute/modes/rigid_body.h"
@@ -69,7 +69,7 @@ class Solution {
         options_(options),
         watch_(watch),
         ordered_(std::move(ordered)),
-        rigid_(RigidBodyModes(nodes, system, options.held)),
+        rigid_(RigidBodyModes(nodes, system, options.fixed)),
         rigid_momenta_(system.M.selfadjointView<Eigen::Lower>() * rigid_),
         workers_(ThreadCount()) {}
 
@@ -145,7 +145,7 @@ class Solution {
   double BoundOfHighest() const { return 4 * StiffestNode(ordered_.matrix); }
 
   /// Returns an upper bound near the lowest deformation eigenvalue.
-  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.held); }
+  double BoundOfLowest() const { return LowestEigenvalueBound(nodes_, system_, options_.fixed); }
 
   /// Removes the rigid-body modes, and makes all checks except the one for completeness.
   absl::StatusOr<DeformationModes> Verify(Modes all, double limit) const {
@@ -168,7 +168,7 @@ class Solution {
     const Eigen::Index free_motions = (all.eigenvalues.array() < FreeMotionBound(limit)).count();
     if (free_motions > rigid_mode_count()) {
       return SeveralPieces(static_cast<int>(free_motions), rigid_mode_count(),
-                           !options_.held.empty());
+                           !options_.fixed.empty());
     }
     Keep(kept, all);
     result.modes = std::move(all);
@@ -332,8 +332,8 @@ absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& sys
                                                        const TetMesh& mesh, double eigenvalue_limit,
                                                        const SolveWatch& watch,
                                                        SolveOptions options) {
-  options.held = PlacesOf(mesh.held, mesh);
-  if (mesh.held.empty()) {
+  options.fixed = PlacesOf(mesh.fixed, mesh);
+  if (mesh.fixed.empty()) {
     return SolveDeformationModes(system, mesh.nodes, eigenvalue_limit, watch, options);
   }
   const std::vector<int32_t> moving = MovingNodes(mesh);

@@ -51,7 +51,7 @@ enum class SolveStage { kFactor, kSolve, kVerify };
 using SolveWatch = std::function<void(SolveStage, double)>;
 
 struct SolveOptions {
-  std::vector<Point> held = {};  ///< positions of the fixed nodes
+  std::vector<Point> fixed = {};  ///< positions of the fixed nodes
   int max_mode_count = kMaxModeCount;
   /// If this is set, the limit is lowered until the modes below it cost at most these means and are
   /// at most max_mode_count.

@@ -124,16 +124,16 @@ class Places {
 
   /// Returns for each edge or face whether it is fixed, that is, whether all of its corners are
   /// fixed.
-  std::vector<bool> HeldWith(const TetMesh& mesh) const {
-    std::vector<bool> node_is_held(mesh.nodes.size());
-    for (const int32_t node : mesh.held) node_is_held[static_cast<size_t>(node)] = true;
-    std::vector<bool> held;
+  std::vector<bool> FixedWith(const TetMesh& mesh) const {
+    std::vector<bool> node_is_fixed(mesh.nodes.size());
+    for (const int32_t node : mesh.fixed) node_is_fixed[static_cast<size_t>(node)] = true;
+    std::vector<bool> fixed;
     for (const auto& corners : nodes_) {
-      held.push_back(std::ranges::all_of(corners, [&](int32_t node) {
-        return node < 0 || node_is_held[static_cast<size_t>(node)];
+      fixed.push_back(std::ranges::all_of(corners, [&](int32_t node) {
+        return node < 0 || node_is_fixed[static_cast<size_t>(node)];
       }));
     }
-    return held;
+    return fixed;
   }
 
   /// Returns for each edge or face the largest of the nodes' values at its corners.
@@ -190,7 +190,7 @@ class Estimator {
         nodes_(static_cast<size_t>(mesh.nodes_per_element)),
         integrals_(mesh.nodes_per_element),
         places_(mesh),
-        held_(places_.HeldWith(mesh)),
+        fixed_(places_.FixedWith(mesh)),
         weights_(places_.LargestOf(ReentrantWeights(mesh))),
         stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
@@ -236,7 +236,7 @@ class Estimator {
     }
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
     for (size_t b = 0; b < places_.count(); ++b) {
-      if (held_[b]) continue;  // its residual is the reaction force
+      if (fixed_[b]) continue;  // its residual is the reaction force
       const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
       const Eigen::RowVectorXd part =
           weights_[b] * r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum();
@@ -246,7 +246,7 @@ class Estimator {
     const Eigen::VectorXd weights = WeightsOf(eigenvalues, sums);
     for (size_t b = 0; b < places_.count(); ++b) {
       const auto row = static_cast<Eigen::Index>(b);
-      if (!held_[b]) shares[row] += residuals.row(3 * row) * weights;
+      if (!fixed_[b]) shares[row] += residuals.row(3 * row) * weights;
     }
     return sums;
   }
@@ -348,7 +348,7 @@ class Estimator {
   const ReferenceIntegrals integrals_;
   const CurvedIntegrals curved_;
   const Places places_;
-  const std::vector<bool> held_;
+  const std::vector<bool> fixed_;
   const std::vector<double> weights_;       // w of each edge or face
   std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each edge or face
 };

@@ -53,9 +53,9 @@ MatrixXd Motions(const std::vector<Point>& nodes, const Frame& frame) {
 
 /// Returns the combinations of the six motions that do not move the fixed nodes, 6 by the number of
 /// combinations.
-MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
-  if (held.empty()) return MatrixXd::Identity(6, 6);
-  const MatrixXd motions = Motions(held, frame);
+MatrixXd FreeCombinations(const std::vector<Point>& fixed, const Frame& frame) {
+  if (fixed.empty()) return MatrixXd::Identity(6, 6);
+  const MatrixXd motions = Motions(fixed, frame);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> gram(motions.transpose() * motions);
   const double largest = gram.eigenvalues().maxCoeff();
   const Index count =
@@ -65,16 +65,16 @@ MatrixXd FreeCombinations(const std::vector<Point>& held, const Frame& frame) {
 
 /// Returns the distance of each node to the nearest fixed node, relative to the body's size, or one
 /// if no node is fixed.
-Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point>& held,
+Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point>& fixed,
                         double size) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(static_cast<Index>(nodes.size()));
-  if (held.empty()) return weights;
-  const size_t stride = (held.size() + kMaxDistanceSamples - 1) / kMaxDistanceSamples;
+  if (fixed.empty()) return weights;
+  const size_t stride = (fixed.size() + kMaxDistanceSamples - 1) / kMaxDistanceSamples;
   for (size_t n = 0; n < nodes.size(); ++n) {
     const auto p = Eigen::Vector3d::Map(nodes[n].data());
     double nearest = HUGE_VAL;
-    for (size_t h = 0; h < held.size(); h += stride) {
-      nearest = std::min(nearest, (p - Eigen::Vector3d::Map(held[h].data())).squaredNorm());
+    for (size_t h = 0; h < fixed.size(); h += stride) {
+      nearest = std::min(nearest, (p - Eigen::Vector3d::Map(fixed[h].data())).squaredNorm());
     }
     weights[static_cast<Index>(n)] = std::sqrt(nearest) / size;
   }
@@ -83,9 +83,9 @@ Eigen::VectorXd Weights(const std::vector<Point>& nodes, const std::vector<Point
 
 /// Returns displacements that are polynomials of second degree times the distance to the fixed
 /// nodes.
-MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Point>& held) {
+MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Point>& fixed) {
   const Frame frame(nodes);
-  const Eigen::VectorXd weights = Weights(nodes, held, frame.size);
+  const Eigen::VectorXd weights = Weights(nodes, fixed, frame.size);
   MatrixXd fields = MatrixXd::Zero(3 * static_cast<Index>(nodes.size()), 30);
   for (size_t n = 0; n < nodes.size(); ++n) {
     const auto i = static_cast<Index>(n);
@@ -105,9 +105,9 @@ MatrixXd PolynomialFields(const std::vector<Point>& nodes, const std::vector<Poi
 }  // namespace
 
 MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& system,
-                        const std::vector<Point>& held) {
+                        const std::vector<Point>& fixed) {
   const Frame frame(nodes);
-  MatrixXd motions = Motions(nodes, frame) * FreeCombinations(held, frame);
+  MatrixXd motions = Motions(nodes, frame) * FreeCombinations(fixed, frame);
   if (motions.cols() == 0) return motions;
   const MatrixXd gram = motions.transpose() * (system.M.selfadjointView<Eigen::Lower>() * motions);
   const Eigen::LLT<MatrixXd> factor(gram);
@@ -116,11 +116,11 @@ MatrixXd RigidBodyModes(const std::vector<Point>& nodes, const SystemMatrices& s
 }
 
 double LowestEigenvalueBound(const std::vector<Point>& nodes, const SystemMatrices& system,
-                             const std::vector<Point>& held) {
-  MatrixXd fields = PolynomialFields(nodes, held);
+                             const std::vector<Point>& fixed) {
+  MatrixXd fields = PolynomialFields(nodes, fixed);
   Index rigid_count = 6;  // a free body's rigid-body modes are first-degree polynomials
-  if (!held.empty()) {
-    const MatrixXd rigid = RigidBodyModes(nodes, system, held);
+  if (!fixed.empty()) {
+    const MatrixXd rigid = RigidBodyModes(nodes, system, fixed);
     rigid_count = rigid.cols();
     fields.conservativeResize(Eigen::NoChange, 30 + rigid_count);
     fields.rightCols(rigid_count) = rigid;

@@ -15,7 +15,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "precompute/fem/held_nodes.h"
+#include "precompute/fem/moving_nodes.h"
 #include "precompute/sparse/openblas.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"

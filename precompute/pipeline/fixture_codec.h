@@ -2,7 +2,7 @@
 #pragma once
 
 #include "carillon/v1/modal_model.pb.h"
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 
 namespace carillon::precompute {
 

@@ -8,7 +8,7 @@
 #include "carillon/v1/decomposition.pb.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 #include "precompute/pipeline/intended_use.h"
 #include "precompute/pipeline/resolution.h"
 

@@ -43,7 +43,7 @@ absl::Status CheckFixtures(const v1::DecompositionSettings& settings) {
   }
   if (settings.fixtures_size() <= kMostFixtures) return absl::OkStatus();
   return Invalid(absl::StrCat("there are ", settings.fixtures_size(), " fixtures; at most ",
-                              kMostFixtures, " are taken: hold a group, or a larger box"));
+                              kMostFixtures, " are taken: fix a group, or a larger box"));
 }
 
 absl::Status CheckChoices(const v1::DecompositionSettings& settings) {

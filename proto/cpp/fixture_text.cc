@@ -48,7 +48,7 @@ bool ToTwoVectors(absl::string_view text, v1::Vec3& first, v1::Vec3& second) {
   return parts.size() == 2 && ToVector(parts[0], first) && ToVector(parts[1], second);
 }
 
-bool ToVertices(absl::string_view text, v1::HeldVertices& vertices) {
+bool ToVertices(absl::string_view text, v1::FixedVertices& vertices) {
   for (const absl::string_view word : absl::StrSplit(text, ',')) {
     uint32_t index = 0;
     if (!absl::SimpleAtoi(word, &index)) return false;
@@ -59,11 +59,11 @@ bool ToVertices(absl::string_view text, v1::HeldVertices& vertices) {
 
 bool ToFixture(absl::string_view kind, absl::string_view rest, v1::Fixture& fixture) {
   if (kind == "plane") {
-    v1::HeldPlane& plane = *fixture.mutable_plane();
+    v1::FixedPlane& plane = *fixture.mutable_plane();
     return ToTwoVectors(rest, *plane.mutable_point_m(), *plane.mutable_normal());
   }
   if (kind == "box") {
-    v1::HeldBox& box = *fixture.mutable_box();
+    v1::FixedBox& box = *fixture.mutable_box();
     return ToTwoVectors(rest, *box.mutable_low_m(), *box.mutable_high_m());
   }
   if (kind == "vertices") return ToVertices(rest, *fixture.mutable_vertices());
@@ -85,31 +85,31 @@ std::string Text(double x, double y, double z) {
   return absl::StrCat(Shortest(x), ",", Shortest(y), ",", Shortest(z));
 }
 
-absl::StatusOr<std::string> PlaneText(const v1::HeldPlane& plane) {
+absl::StatusOr<std::string> PlaneText(const v1::FixedPlane& plane) {
   const v1::Vec3& p = plane.point_m();
   const v1::Vec3& n = plane.normal();
   const double length = std::hypot(n.x(), n.y(), n.z());
   if (!IsFinite(p) || !std::isfinite(length) || !(length > 0)) {
-    return Invalid("a plane that is held needs a finite point and a normal longer than zero");
+    return Invalid("a fixed plane needs a finite point and a normal longer than zero");
   }
   return absl::StrCat("plane:", Text(p.x(), p.y(), p.z()), "/",
                       Text(n.x() / length, n.y() / length, n.z() / length));
 }
 
-absl::StatusOr<std::string> BoxText(const v1::HeldBox& box) {
+absl::StatusOr<std::string> BoxText(const v1::FixedBox& box) {
   const v1::Vec3& a = box.low_m();
   const v1::Vec3& b = box.high_m();
-  if (!IsFinite(a) || !IsFinite(b)) return Invalid("a box that is held needs finite corners");
+  if (!IsFinite(a) || !IsFinite(b)) return Invalid("a fixed box needs finite corners");
   return absl::StrCat(
       "box:", Text(std::min(a.x(), b.x()), std::min(a.y(), b.y()), std::min(a.z(), b.z())), "/",
       Text(std::max(a.x(), b.x()), std::max(a.y(), b.y()), std::max(a.z(), b.z())));
 }
 
-absl::StatusOr<std::string> VerticesText(const v1::HeldVertices& vertices) {
+absl::StatusOr<std::string> VerticesText(const v1::FixedVertices& vertices) {
   const std::set<uint32_t> indices(vertices.indices().begin(), vertices.indices().end());
-  if (indices.empty() || indices.size() > static_cast<size_t>(kMaxHeldVertices)) {
-    return Invalid(absl::StrCat(indices.size(), " vertices are to be held; name 1 to ",
-                                kMaxHeldVertices, ", or a plane, a box or a group"));
+  if (indices.empty() || indices.size() > static_cast<size_t>(kMaxFixedVertices)) {
+    return Invalid(absl::StrCat(indices.size(), " vertices are to be fixed; name 1 to ",
+                                kMaxFixedVertices, ", or a plane, a box or a group"));
   }
   return absl::StrCat("vertices:", absl::StrJoin(indices, ","));
 }
@@ -117,7 +117,7 @@ absl::StatusOr<std::string> VerticesText(const v1::HeldVertices& vertices) {
 absl::StatusOr<std::string> GroupText(const std::string& group) {
   const bool one_line = group.find_first_of(std::string("\n\r\0", 3)) == std::string::npos;
   if (group.empty() || group.size() > kMaxGroupBytes || !one_line) {
-    return Invalid(absl::StrCat("a group that is held has a name of ", group.size(),
+    return Invalid(absl::StrCat("a fixed group has a name of ", group.size(),
                                 " bytes; it must have 1 to ", kMaxGroupBytes,
                                 " and no line break"));
   }
@@ -139,7 +139,7 @@ absl::StatusOr<v1::Fixture> ParseFixture(absl::string_view text) {
 }
 
 absl::StatusOr<std::string> FixtureText(const v1::Fixture& fixture) {
-  switch (fixture.held_case()) {
+  switch (fixture.region_case()) {
     case v1::Fixture::kVertices:
       return VerticesText(fixture.vertices());
     case v1::Fixture::kPlane:
@@ -148,7 +148,7 @@ absl::StatusOr<std::string> FixtureText(const v1::Fixture& fixture) {
       return BoxText(fixture.box());
     case v1::Fixture::kGroup:
       return GroupText(fixture.group());
-    case v1::Fixture::HELD_NOT_SET:
+    case v1::Fixture::REGION_NOT_SET:
       break;
   }
   return Invalid("a fixture says nothing; name vertices, a plane, a box or a group");

@@ -13,7 +13,7 @@ namespace carillon {
 ///
 ///     plane:PX,PY,PZ/NX,NY,NZ    a point of the plane, and its normal (toward the free side)
 ///     box:X0,Y0,Z0/X1,Y1,Z1      two opposite corners
-///     vertices:I,J,...           at most kMaxHeldVertices
+///     vertices:I,J,...           at most kMaxFixedVertices
 ///     group:NAME                 at most 200 bytes, without line breaks
 ///
 /// Errors: INVALID_SETTINGS.
@@ -25,6 +25,7 @@ absl::StatusOr<v1::Fixture> ParseFixture(absl::string_view text);
 /// exceeded).
 absl::StatusOr<std::string> FixtureText(const v1::Fixture& fixture);
 
-inline constexpr int kMaxHeldVertices = 10'000;  // their text must fit in one argument of a program
+inline constexpr int kMaxFixedVertices =
+    10'000;  // their text must fit in one argument of a program
 
 }  // namespace carillon

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A square bar held at one end against closed forms.
+// A square bar fixed at one end against closed forms.
 #include <gtest/gtest.h>
 
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 #include "tests/physics/mode_families.h"
 #include "tests/physics/natural_frequencies.h"
 #include "tests/physics/timoshenko_beam.h"
@@ -45,7 +45,7 @@ TEST_F(CantileverTest, NothingIsLeftToMoveFreely) {
   EXPECT_EQ(modes.verification.sturm_count, modes.modes.eigenvalues.size());
 }
 
-// Beam theory leaves a clamped section free to grow narrower; held as it is, the bar is a little
+// Beam theory leaves a clamped section free to grow narrower; fixed as it is, the bar is a little
 // stiffer: some tenths of its side shorter.
 TEST_F(CantileverTest, BendsInPairsAsTimoshenkoSays) {
   const std::vector<double> bending = Of(Family::kBending);
@@ -64,7 +64,7 @@ TEST_F(CantileverTest, TwistsAsAQuarterWaveWithSaintVenantsConstant) {
   const std::vector<double> torsion = Of(Family::kTorsional);
   ASSERT_GE(torsion.size(), 2u);
   const double shear_speed = std::sqrt(ToLame(kSteel).mu_pa / kDensity);
-  // J = 0.140577 a^4 over the polar moment a^4 / 6. Held flat where it would warp: stiffer.
+  // J = 0.140577 a^4 over the polar moment a^4 / 6. Fixed flat where it would warp: stiffer.
   const double speed = shear_speed * std::sqrt(0.140577 * 6);
   for (size_t n = 0; n < 2; ++n) {
     const double expected = (2 * static_cast<double>(n) + 1) * speed / (4 * kLength);

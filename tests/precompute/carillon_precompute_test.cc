@@ -20,6 +20,7 @@
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "tests/precompute/carillon_precompute_run.h"
 
 namespace carillon::precompute {
@@ -300,7 +301,7 @@ TEST_F(CarillonPrecomputeTest, ContradictoryOptionsAreRefusedInWords) {
 // Clamped and free ends alike are a cantilever's first mode 6.27 times lower than a free bar's: the
 // squares of 1.8751 and 4.7300. Ends that may not narrow and shear make some per cent of
 // difference.
-TEST_F(CarillonPrecomputeTest, BarHeldAtOneEndBendsLowerThanAFreeOne) {
+TEST_F(CarillonPrecomputeTest, BarFixedAtOneEndBendsLowerThanAFreeOne) {
   const auto first_hz = [&](const std::string& options) {
     const Result result = Run(bar + " --out " + model + " --unit mm --nodes 150 --json" + kSteel +
                               " --accuracy 2% " + options);
@@ -310,9 +311,9 @@ TEST_F(CarillonPrecomputeTest, BarHeldAtOneEndBendsLowerThanAFreeOne) {
     return report.at("modes")[0].at("frequency_hz").get<double>();
   };
   const double free = first_hz("--band 20:9000");
-  const double held = first_hz("--band 20:9000 --fix plane:0,0,0/1,0,0");
-  EXPECT_NEAR(free / held, std::pow(4.7300 / 1.8751, 2), 0.3);
-  EXPECT_EQ(first_hz("--band 20:9000 --fix box:0,0,0/0,0.02,0.012"), held);
+  const double fixed = first_hz("--band 20:9000 --fix plane:0,0,0/1,0,0");
+  EXPECT_NEAR(free / fixed, std::pow(4.7300 / 1.8751, 2), 0.3);
+  EXPECT_EQ(first_hz("--band 20:9000 --fix box:0,0,0/0,0.02,0.012"), fixed);
   const v1::ModalModelHeader header = ReadRecords(model)[0].header();
   EXPECT_EQ(header.verification().rigid_mode_count(), 0u);
   EXPECT_EQ(header.verification().sturm_count(), header.mode_count());
@@ -323,9 +324,9 @@ TEST_F(CarillonPrecomputeTest, BarHeldAtOneEndBendsLowerThanAFreeOne) {
 TEST_F(CarillonPrecomputeTest, FixturesThatHoldNothingAreRefused) {
   EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix floor")), "INVALID_SETTINGS");
   EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix group:base")), "GROUP_UNKNOWN");
-  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix vertices:8")), "NO_VERTEX_HELD");
+  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix vertices:8")), "NO_VERTEX_FIXED");
   EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix plane:0,0,0/-1,0,0")),
-            "ALL_VERTICES_HELD");
+            "ALL_VERTICES_FIXED");
 }
 
 TEST_F(CarillonPrecomputeTest, ABandWithoutAnEndIsRefused) {
@@ -338,13 +339,13 @@ TEST_F(CarillonPrecomputeTest, OpenSurfaceIsRefused) {
 }
 
 struct WorkerEventsTest : CarillonPrecomputeTest {
-  std::vector<v1::WorkerEvent> EventsOf(const std::string& options) const {
+  std::vector<worker::v1::WorkerEvent> EventsOf(const std::string& options) const {
     const std::string events = folder + "/events";
     RunBar(options + " --events-fd 3 3> " + events);
     const int descriptor = open(events.c_str(), O_RDONLY);
     google::protobuf::io::FileInputStream file(descriptor);
-    std::vector<v1::WorkerEvent> result;
-    v1::WorkerEvent event;
+    std::vector<worker::v1::WorkerEvent> result;
+    worker::v1::WorkerEvent event;
     while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&event, &file, nullptr)) {
       result.push_back(event);
     }
@@ -354,10 +355,10 @@ struct WorkerEventsTest : CarillonPrecomputeTest {
 };
 
 TEST_F(WorkerEventsTest, ProgressNeverGoesBackAndEndsWithAll) {
-  const std::vector<v1::WorkerEvent> events = EventsOf(kSteel);
+  const std::vector<worker::v1::WorkerEvent> events = EventsOf(kSteel);
   ASSERT_FALSE(events.empty());
   double last = 0;
-  for (const v1::WorkerEvent& event : events) {
+  for (const worker::v1::WorkerEvent& event : events) {
     ASSERT_TRUE(event.has_progress());
     EXPECT_GE(event.progress().fraction(), last);
     last = event.progress().fraction();
@@ -370,7 +371,8 @@ TEST_F(WorkerEventsTest, ProgressNeverGoesBackAndEndsWithAll) {
 }
 
 TEST_F(WorkerEventsTest, RefusalIsTheLastEvent) {
-  const std::vector<v1::WorkerEvent> events = EventsOf(std::string(kSteel) + " --band 20:1000");
+  const std::vector<worker::v1::WorkerEvent> events =
+      EventsOf(std::string(kSteel) + " --band 20:1000");
   ASSERT_FALSE(events.empty());
   EXPECT_EQ(events.back().error().reason(), "NO_MODE_IN_BAND");
   EXPECT_TRUE(events.back().error().metadata().contains("first_mode_hz"));

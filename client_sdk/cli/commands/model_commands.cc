@@ -92,7 +92,7 @@ void PrintSummary(const v1::ModalModelSummary& model) {
   absl::PrintF("poisson    %.4f\n", header.settings().poisson_ratio());
   if (model.has_material()) absl::PrintF("material   %s\n", MaterialText(model.material()));
   for (const v1::Fixture& fixture : header.settings().fixtures()) {
-    absl::PrintF("held       %s\n", FixtureText(fixture).value_or("?"));
+    absl::PrintF("fixed      %s\n", FixtureText(fixture).value_or("?"));
   }
   absl::PrintF("residual   %.2g at most, orthogonality %.2g\n", proof.max_residual(),
                proof.max_orthogonality_error());

@@ -75,10 +75,10 @@ def board(name, sides, position, slope_degrees, **sounding):
 
 
 def shelf(name, material, position, slope_degrees):
-    """Its edge at the wall, in +y, is screwed on: the last 2 cm are held."""
+    """Its edge at the wall, in +y, is screwed on: the last 2 cm are fixed."""
     x, y, z = (side / 2 for side in SHELF_M)
     return board(name, SHELF_M, position, slope_degrees, material=material, max_frequency_hz=8000,
-                 held_m={"low": [-x, y - 0.02, -z], "high": [x, y, z]})
+                 fixed_m={"low": [-x, y - 0.02, -z], "high": [x, y, z]})
 
 
 def chute():

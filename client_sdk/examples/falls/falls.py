@@ -68,7 +68,7 @@ def mesh_of(body, folder):
 
 
 # All that makes one model another.
-SOUNDING = ("shape", "mesh", "repair", "wall_m", "held_m", "material", "max_frequency_hz")
+SOUNDING = ("shape", "mesh", "repair", "wall_m", "fixed_m", "material", "max_frequency_hz")
 
 
 def settings_of(body):
@@ -76,9 +76,9 @@ def settings_of(body):
     settings = modal_model_pb2.DecompositionSettings()
     settings.mesh.wall_m = body.get("wall_m", 0)
     settings.mesh.repair = body.get("repair", False)
-    if "held_m" in body:
-        low, high = (contact_pb2.Vec3(x=x, y=y, z=z) for x, y, z in (body["held_m"]["low"], body["held_m"]["high"]))
-        settings.fixtures.add().box.CopyFrom(modal_model_pb2.HeldBox(low_m=low, high_m=high))
+    if "fixed_m" in body:
+        low, high = (contact_pb2.Vec3(x=x, y=y, z=z) for x, y, z in (body["fixed_m"]["low"], body["fixed_m"]["high"]))
+        settings.fixtures.add().box.CopyFrom(modal_model_pb2.FixedBox(low_m=low, high_m=high))
     return settings
 
 

@@ -74,19 +74,19 @@ class Splitter {
   }
 
   void Fix() {
-    std::vector<bool> held(split_.nodes.size(), false);
-    for (const int32_t node : mesh_.held) held[static_cast<size_t>(node)] = true;
-    for (size_t e = 0; e < split_.element_count() && !mesh_.held.empty(); ++e) {
+    std::vector<bool> fixed(split_.nodes.size(), false);
+    for (const int32_t node : mesh_.fixed) fixed[static_cast<size_t>(node)] = true;
+    for (size_t e = 0; e < split_.element_count() && !mesh_.fixed.empty(); ++e) {
       const int32_t* nodes = &split_.elements[10 * e];
       for (size_t i = 0; i < kTetEdges.size(); ++i) {
         const auto [a, b] = kTetEdges[i];
-        if (held[static_cast<size_t>(nodes[a])] && held[static_cast<size_t>(nodes[b])]) {
-          held[static_cast<size_t>(nodes[4 + i])] = true;
+        if (fixed[static_cast<size_t>(nodes[a])] && fixed[static_cast<size_t>(nodes[b])]) {
+          fixed[static_cast<size_t>(nodes[4 + i])] = true;
         }
       }
     }
-    for (size_t node = 0; node < held.size(); ++node) {
-      if (held[node]) split_.held.push_back(static_cast<int32_t>(node));
+    for (size_t node = 0; node < fixed.size(); ++node) {
+      if (fixed[node]) split_.fixed.push_back(static_cast<int32_t>(node));
     }
   }
 

@@ -59,7 +59,7 @@ void AddBody(CLI::App& app, Settings& settings) {
            }
            *settings.add_fixtures() = *fixture;
          },
-         "hold the body where it touches or lies behind a plane, in a box, at vertices or in a "
+         "fix the body where it touches or lies behind a plane, in a box, at vertices or in a "
          "group of the file; repeat it for more: plane:X,Y,Z/NX,NY,NZ (the normal points to the "
          "free side), box:X,Y,Z/X,Y,Z, vertices:I,J,... or group:NAME, in metres")
       ->allow_extra_args(false)

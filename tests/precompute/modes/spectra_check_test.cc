@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {

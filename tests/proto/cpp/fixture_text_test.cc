@@ -41,9 +41,9 @@ TEST(FixtureText, WhatIsNoFixtureIsRefusedInWords) {
   EXPECT_THAT(Canonical("group:two\nlines"), HasSubstr("no line break"));
   v1::Fixture fixture;
   EXPECT_THAT(FixtureText(fixture).status().ToString(), HasSubstr("a fixture says nothing"));
-  for (uint32_t i = 0; i <= kMaxHeldVertices; ++i) fixture.mutable_vertices()->add_indices(i);
+  for (uint32_t i = 0; i <= kMaxFixedVertices; ++i) fixture.mutable_vertices()->add_indices(i);
   EXPECT_THAT(FixtureText(fixture).status().ToString(),
-              HasSubstr("INVALID_SETTINGS: 10001 vertices are to be held; name 1 to 10000"));
+              HasSubstr("INVALID_SETTINGS: 10001 vertices are to be fixed; name 1 to 10000"));
 }
 
 }  // namespace

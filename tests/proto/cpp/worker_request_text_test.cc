@@ -11,7 +11,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 TEST(WorkerRequestText, ReadsBackEveryDigitAndEveryByte) {
-  v1::WorkerRequest request;
+  worker::v1::WorkerRequest request;
   request.set_mesh_format("obj");
   request.mutable_settings()->set_poisson_ratio(-0.1);
   request.mutable_settings()->mutable_mesh()->set_keep_surface(false);
@@ -25,7 +25,7 @@ TEST(WorkerRequestText, ReadsBackEveryDigitAndEveryByte) {
 
 // A group may be called as a shell script ends its input.
 TEST(WorkerRequestText, HasNoLineThatIsOneWord) {
-  v1::WorkerRequest request;
+  worker::v1::WorkerRequest request;
   request.mutable_settings()->add_fixtures()->set_group("a\nEND_OF_REQUEST\nb");
   EXPECT_THAT(WorkerRequestText(request), ::testing::Not(HasSubstr("\nEND_OF_REQUEST\n")));
 }

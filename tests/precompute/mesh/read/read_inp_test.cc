@@ -71,14 +71,14 @@ TEST_F(ReadInpTest, NodesOfTheAssemblyAreNotThoseOfTheParts) {
   const absl::StatusOr<NamedMesh> read = ReadNamed(
       Part("Bar") +
           "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B-1, PART=Bar\n*END INSTANCE\n*NODE\n1, 9,9,9\n"
-          "*NSET, NSET=held, INSTANCE=B-1\n2, 3\n*NSET, NSET=mixed\nB-1.tip, B-1.1\n"
+          "*NSET, NSET=fixed, INSTANCE=B-1\n2, 3\n*NSET, NSET=mixed\nB-1.tip, B-1.1\n"
           "*NSET, NSET=tip, INSTANCE=B-1\n1\n*END ASSEMBLY\n",
       "inp");
   ASSERT_TRUE(read.ok()) << read.status();
   ExpectNodes(std::get<TetMesh>(read->mesh), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
   std::vector<std::string> names;
   for (const MeshGroup& group : read->names.groups) names.push_back(group.name);
-  EXPECT_THAT(names, ElementsAre("all", "B-1.tip", "held", "mixed", "tip"));
+  EXPECT_THAT(names, ElementsAre("all", "B-1.tip", "fixed", "mixed", "tip"));
   EXPECT_THAT(read->names.groups[2].simplices,
               ElementsAre(std::array{1, -1, -1, -1}, std::array{2, -1, -1, -1}));
   EXPECT_EQ(read->names.groups[3].simplices.size(), 2U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/fem/held_nodes.h"
+#include "precompute/fem/moving_nodes.h"
 
 namespace carillon::precompute {
 namespace {
@@ -36,11 +36,11 @@ Sparse Restricted(const Sparse& lower, const std::vector<int>& number, int size)
 
 std::vector<int32_t> MovingNodes(const TetMesh& mesh) {
   std::vector<int32_t> moving;
-  moving.reserve(mesh.nodes.size() - mesh.held.size());
-  auto held = mesh.held.begin();
+  moving.reserve(mesh.nodes.size() - mesh.fixed.size());
+  auto fixed = mesh.fixed.begin();
   for (int32_t node = 0; node < static_cast<int32_t>(mesh.nodes.size()); ++node) {
-    if (held != mesh.held.end() && *held == node) {
-      ++held;
+    if (fixed != mesh.fixed.end() && *fixed == node) {
+      ++fixed;
     } else {
       moving.push_back(node);
     }

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bar that is held at one end, through the daemon: another model than the free one, an octave and more lower,
-silent where it is held."""
+"""A bar that is fixed at one end, through the daemon: another model than the free one, an octave and more lower,
+silent where it is fixed."""
 
 import json
 import math
@@ -26,7 +26,7 @@ def bar_with_an_end():
     return b"\n".join(lines)
 
 
-class HeldTest(DaemonTest):
+class FixedTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -48,13 +48,13 @@ class HeldTest(DaemonTest):
                 for value in shown["eigenvalues"]]
 
     def test_first_mode_is_that_of_a_cantilever(self):
-        held = self.frequencies_hz(self.create("--fix", CLAMP))
+        fixed = self.frequencies_hz(self.create("--fix", CLAMP))
         euler = (1.875104**2 / (2 * math.pi * LENGTH**2)
                  * math.sqrt(meshes.YOUNG_PA * HEIGHT**2 / (12 * meshes.DENSITY)))
         # Clamped against narrowing it is a little stiffer than Euler's, by some parts in a thousand.
-        self.assertAlmostEqual(held[0] / euler, 1, delta=0.015)
+        self.assertAlmostEqual(fixed[0] / euler, 1, delta=0.015)
         free = self.frequencies_hz(self.create())
-        self.assertGreater(free[0] / held[0], 6)
+        self.assertGreater(free[0] / fixed[0], 6)
 
     def test_every_way_to_say_it_is_a_model_of_its_own_with_the_same_sound(self):
         models = {self.create("--fix", CLAMP), self.create("--fix", "plane:0,5,5/2,0,0"),
@@ -70,7 +70,7 @@ class HeldTest(DaemonTest):
         proof = self.header(model)["verification"]
         self.assertEqual(proof.get("rigid_mode_count", 0), 0)
 
-    def test_blow_is_heard_where_the_bar_moves_and_not_where_it_is_held(self):
+    def test_blow_is_heard_where_the_bar_moves_and_not_where_it_is_fixed(self):
         model = self.create("--fix", CLAMP)
 
         def loudness(x):
@@ -84,7 +84,7 @@ class HeldTest(DaemonTest):
         self.assertGreater(loudness(LENGTH), 1e-4)
         self.assertEqual(loudness(0), 0)
 
-    def test_tetrahedra_of_tetgen_and_medit_are_held_by_their_own_names(self):
+    def test_tetrahedra_of_tetgen_and_medit_are_fixed_by_their_own_names(self):
         nodes, tetrahedra = meshes.tetrahedra_of_bar(16, 2, 1)
         at_end = [1 if x == 0 else 0 for x, _, _ in nodes]
         node_file = self.folder / "bar.node"
@@ -103,14 +103,14 @@ class HeldTest(DaemonTest):
                                   (medit_file, "group:1")))
         frequencies = self.frequencies_hz(by_plane)
         self.assertGreater(len(frequencies), 3)
-        # The mid-side nodes between those that are marked are held, too.
+        # The mid-side nodes between those that are marked are fixed, too.
         self.assertEqual(self.frequencies_hz(by_marker), frequencies)
         self.assertEqual(self.frequencies_hz(by_reference), frequencies)
 
-    def test_refusals_say_what_is_held(self):
+    def test_refusals_say_what_is_fixed(self):
         for fixture, reason, status in (
-                ("group:nose", "GROUP_UNKNOWN", 1), ("vertices:77", "NO_VERTEX_HELD", 1),
-                ("plane:0,0,0/-1,0,0", "ALL_VERTICES_HELD", 1), ("floor", "--fix", 2)):
+                ("group:nose", "GROUP_UNKNOWN", 1), ("vertices:77", "NO_VERTEX_FIXED", 1),
+                ("plane:0,0,0/-1,0,0", "ALL_VERTICES_FIXED", 1), ("floor", "--fix", 2)):
             with self.subTest(fixture):
                 ended = self.daemon.command("model", "create", self.bar, "--material", meshes.MATERIAL, "--wait",
                                             "--fix", fixture, check=False)

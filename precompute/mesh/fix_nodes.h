@@ -38,11 +38,11 @@ struct FixedGroup {
 
 using Fixture = std::variant<FixedVertices, FixedPlane, FixedBox, FixedGroup>;
 
-/// Applies boundary conditions: fills `mesh.held` with the nodes in the regions of the fixtures,
+/// Applies boundary conditions: fills `mesh.fixed` with the nodes in the regions of the fixtures,
 /// including mid-side nodes. The tolerance of a region is a millionth of the body's diagonal.
 /// `given` is the surface to which the boundary of `mesh` refers.
 ///
-/// Errors: NO_VERTEX_HELD (a fixture contains no node), ALL_VERTICES_HELD, GROUP_UNKNOWN.
+/// Errors: NO_VERTEX_FIXED (a fixture contains no node), ALL_VERTICES_FIXED, GROUP_UNKNOWN.
 absl::Status FixNodes(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
                       const MeshNames& names, TetMesh& mesh);
 

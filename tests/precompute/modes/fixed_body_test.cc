@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Bodies that are held: every solver finds the modes of the nodes that move.
+// Bodies that are fixed: every solver finds the modes of the nodes that move.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "precompute/eigen/dense_eigensolver.h"
-#include "precompute/fem/held_nodes.h"
+#include "precompute/fem/moving_nodes.h"
 #include "precompute/mesh/boundary.h"
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/error_estimate.h"
 #include "precompute/modes/rigid_body.h"
@@ -21,7 +21,7 @@ const SolveWatch kSilent = [](SolveStage, double) {};
 constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
 constexpr Point kSize{1, 0.6, 0.3};
 
-/// What is held at the box's corner at the origin, and how many motions are left.
+/// What is fixed at the box's corner at the origin, and how many motions are left.
 struct Holding {
   const char* name;
   std::vector<Fixture> fixtures;
@@ -34,7 +34,7 @@ const Holding kLine{"Line", {FixedBox{{0, 0, 0}, {1, 0, 0}}}, 1};
 const Holding kFace{"Face", {FixedPlane{{0, 0, 0}, {2, 0, 0}}}, 0};
 const Holding kMiddle{"Middle", {FixedBox{{0.3, 0, 0}, {0.7, 1, 1}}}, 0};
 
-TetMesh HeldBoxMesh(const Holding& holding, const std::array<int, 3>& cells, int nodes) {
+TetMesh FixedBoxMesh(const Holding& holding, const std::array<int, 3>& cells, int nodes) {
   TetMesh mesh = MakeTetBox(kSize, cells, nodes);
   const absl::Status status = FixNodes(holding.fixtures, BoundarySurface(mesh), {}, mesh);
   EXPECT_TRUE(status.ok()) << status;
@@ -53,8 +53,8 @@ void PrintTo(const Case& c, std::ostream* out) {
        << (c.mass == MassSharing::kLumped ? "lumped" : "consistent");
 }
 
-struct HeldBodyTest : ::testing::TestWithParam<Case> {
-  TetMesh mesh = HeldBoxMesh(GetParam().holding, GetParam().cells, GetParam().nodes_per_element);
+struct FixedBodyTest : ::testing::TestWithParam<Case> {
+  TetMesh mesh = FixedBoxMesh(GetParam().holding, GetParam().cells, GetParam().nodes_per_element);
   SystemMatrices system = Assemble(mesh, kElastic, 1, GetParam().mass);
   int rigid = GetParam().holding.rigid_mode_count;
 
@@ -66,7 +66,7 @@ struct HeldBodyTest : ::testing::TestWithParam<Case> {
   }
 };
 
-TEST_P(HeldBodyTest, ModesAreAllThoseBelowTheLimitAndTheProofSaysSo) {
+TEST_P(FixedBodyTest, ModesAreAllThoseBelowTheLimitAndTheProofSaysSo) {
   const Eigen::VectorXd eigenvalues = AllEigenvalues();
   const double limit = (eigenvalues[rigid + 19] + eigenvalues[rigid + 20]) / 2;
   const auto result = SolveDeformationModes(system, mesh, limit, kSilent);
@@ -81,13 +81,13 @@ TEST_P(HeldBodyTest, ModesAreAllThoseBelowTheLimitAndTheProofSaysSo) {
   EXPECT_LE(result->verification.max_residual, 1e-6);
 }
 
-TEST_P(HeldBodyTest, ShapesAreZeroWhereTheBodyIsHeld) {
+TEST_P(FixedBodyTest, ShapesAreZeroWhereTheBodyIsFixed) {
   const auto result = SolveDeformationModes(system, mesh, 60, kSilent);
   ASSERT_TRUE(result.ok()) << result.status();
   const Eigen::MatrixXd& shapes = result->modes.shapes;
   ASSERT_EQ(shapes.rows(), 3 * static_cast<Eigen::Index>(mesh.nodes.size()));
   ASSERT_GT(shapes.cols(), 0);
-  for (const int32_t node : mesh.held) {
+  for (const int32_t node : mesh.fixed) {
     EXPECT_EQ(shapes.middleRows<3>(3 * Eigen::Index{node}).cwiseAbs().maxCoeff(), 0);
   }
   for (const int32_t node : MovingNodes(mesh)) {
@@ -95,7 +95,7 @@ TEST_P(HeldBodyTest, ShapesAreZeroWhereTheBodyIsHeld) {
   }
 }
 
-TEST_P(HeldBodyTest, LowestModeAboveTheLimitIsTold) {
+TEST_P(FixedBodyTest, LowestModeAboveTheLimitIsTold) {
   const double lowest = AllEigenvalues()[rigid];
   const auto result = SolveDeformationModes(system, mesh, lowest / 1e4, kSilent);
   ASSERT_TRUE(result.ok()) << result.status();
@@ -103,16 +103,16 @@ TEST_P(HeldBodyTest, LowestModeAboveTheLimitIsTold) {
   EXPECT_NEAR(result->lowest_eigenvalue / lowest, 1, 1e-8);
 }
 
-TEST_P(HeldBodyTest, LowestEigenvalueBoundLiesAboveTheLowestModeAndNearIt) {
+TEST_P(FixedBodyTest, LowestEigenvalueBoundLiesAboveTheLowestModeAndNearIt) {
   const std::vector<Point> moving = PlacesOf(MovingNodes(mesh), mesh);
-  const double bound = LowestEigenvalueBound(moving, system, PlacesOf(mesh.held, mesh));
+  const double bound = LowestEigenvalueBound(moving, system, PlacesOf(mesh.fixed, mesh));
   const double lowest = AllEigenvalues()[rigid];
   EXPECT_GT(bound, lowest * (1 - 1e-9));
   // It sets the scale of a shift, for which two decades are as good.
   EXPECT_LT(bound, 30 * lowest);
 }
 
-TEST_P(HeldBodyTest, SpectraFindsTheSameModes) {
+TEST_P(FixedBodyTest, SpectraFindsTheSameModes) {
   const auto ours = SolveDeformationModes(system, mesh, 60, kSilent);
   ASSERT_TRUE(ours.ok()) << ours.status();
   const auto count = static_cast<int>(ours->modes.eigenvalues.size());
@@ -124,7 +124,7 @@ TEST_P(HeldBodyTest, SpectraFindsTheSameModes) {
 }
 
 // Dense and block Lanczos, linear and quadratic elements, both mass matrices, all ranks.
-INSTANTIATE_TEST_SUITE_P(Bodies, HeldBodyTest,
+INSTANTIATE_TEST_SUITE_P(Bodies, FixedBodyTest,
                          ::testing::Values(Case{kPoint, {4, 3, 2}, 4, MassSharing::kConsistent},
                                            Case{kPoint, {8, 5, 3}, 4, MassSharing::kLumped},
                                            Case{kTwoPoints, {4, 3, 2}, 4, MassSharing::kConsistent},
@@ -136,18 +136,18 @@ INSTANTIATE_TEST_SUITE_P(Bodies, HeldBodyTest,
                                            Case{kFace, {4, 3, 2}, 10, MassSharing::kLumped},
                                            Case{kMiddle, {10, 4, 2}, 4, MassSharing::kConsistent}));
 
-TEST(HeldBody, RigidBodyModesLeaveWhatIsHeldWhereItIsAndBendNothing) {
+TEST(FixedBody, RigidBodyModesLeaveWhatIsFixedWhereItIsAndBendNothing) {
   for (const Holding& holding : {kPoint, kTwoPoints, kLine, kFace}) {
-    const TetMesh mesh = HeldBoxMesh(holding, {4, 3, 2}, 4);
+    const TetMesh mesh = FixedBoxMesh(holding, {4, 3, 2}, 4);
     const SystemMatrices system = Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
     const std::vector<int32_t> moving = MovingNodes(mesh);
     const Eigen::MatrixXd rigid =
-        RigidBodyModes(PlacesOf(moving, mesh), system, PlacesOf(mesh.held, mesh));
+        RigidBodyModes(PlacesOf(moving, mesh), system, PlacesOf(mesh.fixed, mesh));
     ASSERT_EQ(rigid.cols(), holding.rigid_mode_count) << holding.name;
     if (rigid.cols() == 0) continue;
-    // The energy of the free body, so that the motion of what is held would count.
+    // The energy of the free body, so that the motion of what is fixed would count.
     TetMesh free = mesh;
-    free.held.clear();
+    free.fixed.clear();
     const SystemMatrices whole = Assemble(free, kElastic, 1, MassSharing::kConsistent);
     const Eigen::MatrixXd motion = Extended(rigid, moving, mesh.nodes.size());
     const Eigen::MatrixXd energy =
@@ -158,9 +158,9 @@ TEST(HeldBody, RigidBodyModesLeaveWhatIsHeldWhereItIsAndBendNothing) {
 
 // Where a body is clamped there is a singularity of stress, which costs accuracy: more than the
 // estimate says is not there.
-TEST(HeldBody, ErrorOfEachModeIsEstimated) {
+TEST(FixedBody, ErrorOfEachModeIsEstimated) {
   const auto solve = [](const std::array<int, 3>& cells) {
-    const TetMesh mesh = HeldBoxMesh(kFace, cells, 10);
+    const TetMesh mesh = FixedBoxMesh(kFace, cells, 10);
     auto result = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent), mesh,
                                         20, kSilent);
     EXPECT_TRUE(result.ok()) << result.status();

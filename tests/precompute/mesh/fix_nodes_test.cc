@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,10 +33,10 @@ std::vector<int32_t> NodesWhere(const TetMesh& mesh,
 /// Below single precision, in which surfaces are read.
 bool Near(double a, double b) { return std::abs(a - b) < 1e-6; }
 
-class HoldTest : public ReadMeshTest {
+class FixNodesTest : public ReadMeshTest {
  protected:
-  /// The nodes held of a body read from a file, a surface filled with quadratic elements.
-  TetMesh Held(const std::string& bytes, const std::string& format,
+  /// The nodes fixed of a body read from a file, a surface filled with quadratic elements.
+  TetMesh Fixed(const std::string& bytes, const std::string& format,
                const std::vector<Fixture>& fixtures) {
     absl::StatusOr<NamedMesh> named = ReadNamed(bytes, format);
     EXPECT_TRUE(named.ok()) << named.status();
@@ -56,42 +56,42 @@ class HoldTest : public ReadMeshTest {
   absl::Status status;
 };
 
-TEST_F(HoldTest, PlaneHoldsWhatLiesInItAndBehindIt) {
+TEST_F(FixNodesTest, PlaneHoldsWhatLiesInItAndBehindIt) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
-  const TetMesh face = Held(box, "msh", {FixedPlane{{0, 9, 9}, {3, 0, 0}}});
-  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return p[0] == 0; }));
-  const TetMesh half = Held(box, "msh", {FixedPlane{{0.5, 0, 0}, {-1, 0, 0}}});
-  EXPECT_EQ(half.held, NodesWhere(half, [](const Point& p) { return p[0] >= 0.5; }));
+  const TetMesh face = Fixed(box, "msh", {FixedPlane{{0, 9, 9}, {3, 0, 0}}});
+  EXPECT_EQ(face.fixed, NodesWhere(face, [](const Point& p) { return p[0] == 0; }));
+  const TetMesh half = Fixed(box, "msh", {FixedPlane{{0.5, 0, 0}, {-1, 0, 0}}});
+  EXPECT_EQ(half.fixed, NodesWhere(half, [](const Point& p) { return p[0] >= 0.5; }));
   // A thousandth of the body's size away is away.
-  Held(box, "msh", {FixedPlane{{-0.001, 0, 0}, {1, 0, 0}}});
+  Fixed(box, "msh", {FixedPlane{{-0.001, 0, 0}, {1, 0, 0}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the plane"));
+              HasSubstr("NO_VERTEX_FIXED: no node of the body is fixed by the plane"));
 }
 
 // The reader counts the places of such a body from (4090, 0, 0).
-TEST_F(HoldTest, RegionsOfABodyFarAwayCountFromTheOriginOfTheFile) {
+TEST_F(FixNodesTest, RegionsOfABodyFarAwayCountFromTheOriginOfTheFile) {
   TetMesh far_box = MakeTetBox(kSize, {4, 2, 2}, 10);
   for (Point& p : far_box.nodes) p[0] += 4096;
-  const TetMesh face = Held(ToBinaryGmsh(far_box), "msh", {FixedPlane{{4096, 9, 9}, {3, 0, 0}}});
-  EXPECT_THAT(face.held, ::testing::Not(::testing::IsEmpty()));
-  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return p[0] == 6; }));
+  const TetMesh face = Fixed(ToBinaryGmsh(far_box), "msh", {FixedPlane{{4096, 9, 9}, {3, 0, 0}}});
+  EXPECT_THAT(face.fixed, ::testing::Not(::testing::IsEmpty()));
+  EXPECT_EQ(face.fixed, NodesWhere(face, [](const Point& p) { return p[0] == 6; }));
   const TetMesh part =
-      Held(ToBinaryGmsh(far_box), "msh", {FixedBox{{4096.5, 0, 0}, {4098, 0.25, 2}}});
-  EXPECT_EQ(part.held,
+      Fixed(ToBinaryGmsh(far_box), "msh", {FixedBox{{4096.5, 0, 0}, {4098, 0.25, 2}}});
+  EXPECT_EQ(part.fixed,
             NodesWhere(part, [](const Point& p) { return p[0] >= 6.5 && p[1] <= 0.25; }));
 }
 
-TEST_F(HoldTest, BoxHoldsWhatLiesInItAndOnIt) {
+TEST_F(FixNodesTest, BoxHoldsWhatLiesInItAndOnIt) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {4, 2, 2}, 10));
-  const TetMesh mesh = Held(box, "msh", {FixedBox{{0.5, 0, 0}, {2, 0.25, 2}}});
-  EXPECT_EQ(mesh.held,
+  const TetMesh mesh = Fixed(box, "msh", {FixedBox{{0.5, 0, 0}, {2, 0.25, 2}}});
+  EXPECT_EQ(mesh.fixed,
             NodesWhere(mesh, [](const Point& p) { return p[0] >= 0.5 && p[1] <= 0.25; }));
-  Held(box, "msh", {FixedBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
+  Fixed(box, "msh", {FixedBox{{0.1, 0.1, 0.1}, {0.11, 0.11, 0.11}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by the box"));
+              HasSubstr("NO_VERTEX_FIXED: no node of the body is fixed by the box"));
 }
 
-TEST_F(HoldTest, VertexHoldsItsNode) {
+TEST_F(FixNodesTest, VertexHoldsItsNode) {
   for (const char* format : {"obj", "off", "ply"}) {
     const SurfaceMesh surface = MakeBoxSurface(kSize);
     const std::string bytes = std::string(format) == "obj"   ? ToObj(surface)
@@ -99,9 +99,9 @@ TEST_F(HoldTest, VertexHoldsItsNode) {
                                                              : ToBinaryPly(surface);
     for (size_t v = 0; v < surface.vertices.size(); ++v) {
       const Point& at = surface.vertices[v];
-      const TetMesh mesh = Held(bytes, format, {FixedVertices{{static_cast<int64_t>(v)}}});
+      const TetMesh mesh = Fixed(bytes, format, {FixedVertices{{static_cast<int64_t>(v)}}});
       ASSERT_TRUE(status.ok()) << status;
-      EXPECT_EQ(mesh.held, NodesWhere(mesh,
+      EXPECT_EQ(mesh.fixed, NodesWhere(mesh,
                                       [&](const Point& p) {
                                         return Near(p[0], at[0]) && Near(p[1], at[1]) &&
                                                Near(p[2], at[2]);
@@ -111,7 +111,7 @@ TEST_F(HoldTest, VertexHoldsItsNode) {
   }
 }
 
-TEST_F(HoldTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
+TEST_F(FixNodesTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
   const SurfaceMesh surface = MakeBoxSurface(kSize);
   std::vector<int64_t> bottom, edge;
   for (size_t v = 0; v < surface.vertices.size(); ++v) {
@@ -119,27 +119,27 @@ TEST_F(HoldTest, VerticesHoldAllOfATriangleAndAnEdgeBetweenThem) {
     if (p[2] == 0) bottom.push_back(static_cast<int64_t>(v));
     if (p[2] == 0 && p[1] == 0) edge.push_back(static_cast<int64_t>(v));
   }
-  const TetMesh face = Held(ToObj(surface), "obj", {FixedVertices{bottom}});
-  EXPECT_EQ(face.held, NodesWhere(face, [](const Point& p) { return Near(p[2], 0); }));
-  EXPECT_GT(face.held.size(), 20u);
-  const TetMesh line = Held(ToObj(surface), "obj", {FixedVertices{edge}});
-  EXPECT_EQ(line.held,
+  const TetMesh face = Fixed(ToObj(surface), "obj", {FixedVertices{bottom}});
+  EXPECT_EQ(face.fixed, NodesWhere(face, [](const Point& p) { return Near(p[2], 0); }));
+  EXPECT_GT(face.fixed.size(), 20u);
+  const TetMesh line = Fixed(ToObj(surface), "obj", {FixedVertices{edge}});
+  EXPECT_EQ(line.fixed,
             NodesWhere(line, [](const Point& p) { return Near(p[2], 0) && Near(p[1], 0); }));
-  EXPECT_GT(line.held.size(), 4u);
+  EXPECT_GT(line.fixed.size(), 4u);
 }
 
-TEST_F(HoldTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
+TEST_F(FixNodesTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
   const TetMesh box = MakeTetBox(kSize, {4, 2, 2}, 4);
-  const TetMesh mesh = Held(ToTextGmsh(box), "msh", {FixedVertices{{11, 20}}});
-  EXPECT_THAT(mesh.held, ::testing::ElementsAre(0, 9));
-  Held(ToTextGmsh(box), "msh", {FixedVertices{{10}}});
+  const TetMesh mesh = Fixed(ToTextGmsh(box), "msh", {FixedVertices{{11, 20}}});
+  EXPECT_THAT(mesh.fixed, ::testing::ElementsAre(0, 9));
+  Fixed(ToTextGmsh(box), "msh", {FixedVertices{{10}}});
   EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_HELD: no node of the body is fixed by vertex 10: the numbers of "
+              HasSubstr("NO_VERTEX_FIXED: no node of the body is fixed by vertex 10: the numbers of "
                         "the file go from 11 to 55"));
 }
 
-TEST_F(HoldTest, VerticesOfAFormatThatNumbersNoneAreRefused) {
-  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedVertices{{0}}});
+TEST_F(FixNodesTest, VerticesOfAFormatThatNumbersNoneAreRefused) {
+  Fixed(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedVertices{{0}}});
   EXPECT_THAT(status.ToString(), HasSubstr("files of this format do not number vertices"));
 }
 
@@ -149,23 +149,23 @@ constexpr char kGroupedObj[] =
     "o body\ng base ends\nf 1 4 3 2\ng top\nf 5 6 7 8\ng\nf 1 2 6 \\\n5\nf 3 4 8 7\n"
     "g ends\nf 2 3 7 6\nf 4 1 5 8\n";
 
-TEST_F(HoldTest, GroupOfAnObjFileHoldsItsFaces) {
-  const TetMesh base = Held(kGroupedObj, "obj", {FixedGroup{"base"}});
-  EXPECT_EQ(base.held, NodesWhere(base, [](const Point& p) { return Near(p[2], 0); }));
-  const TetMesh ends = Held(kGroupedObj, "obj", {FixedGroup{"ends"}});
-  EXPECT_EQ(ends.held, NodesWhere(ends, [](const Point& p) {
+TEST_F(FixNodesTest, GroupOfAnObjFileHoldsItsFaces) {
+  const TetMesh base = Fixed(kGroupedObj, "obj", {FixedGroup{"base"}});
+  EXPECT_EQ(base.fixed, NodesWhere(base, [](const Point& p) { return Near(p[2], 0); }));
+  const TetMesh ends = Fixed(kGroupedObj, "obj", {FixedGroup{"ends"}});
+  EXPECT_EQ(ends.fixed, NodesWhere(ends, [](const Point& p) {
               return Near(p[2], 0) || Near(p[0], 0) || Near(p[0], 1);
             }));
-  const TetMesh both = Held(kGroupedObj, "obj", {FixedGroup{"base"}, FixedGroup{"top"}});
-  EXPECT_EQ(both.held,
+  const TetMesh both = Fixed(kGroupedObj, "obj", {FixedGroup{"base"}, FixedGroup{"top"}});
+  EXPECT_EQ(both.fixed,
             NodesWhere(both, [](const Point& p) { return Near(p[2], 0) || Near(p[2], 0.25); }));
 }
 
-TEST_F(HoldTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
-  Held(kGroupedObj, "obj", {FixedGroup{"bottom"}});
+TEST_F(FixNodesTest, GroupThatIsNotThereIsRefusedWithThoseThatAre) {
+  Fixed(kGroupedObj, "obj", {FixedGroup{"bottom"}});
   EXPECT_THAT(status.ToString(), HasSubstr("GROUP_UNKNOWN: the mesh file has no group \"bottom\": "
                                            "it has \"base\", \"body\", \"ends\", \"top\""));
-  Held(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedGroup{"base"}});
+  Fixed(ToBinaryStl(MakeBoxSurface(kSize)), "stl", {FixedGroup{"base"}});
   EXPECT_THAT(status.ToString(), HasSubstr("it names none; fix a plane or a box"));
 }
 
@@ -184,25 +184,25 @@ std::string GmshWithABase(const std::string& physical_names) {
   return text;
 }
 
-TEST_F(HoldTest, PhysicalGroupHoldsItsElementsWithTheirMidsideNodes) {
+TEST_F(FixNodesTest, PhysicalGroupHoldsItsElementsWithTheirMidsideNodes) {
   const auto base = [](const Point& p) { return p[2] == 0; };
   const TetMesh named =
-      Held(GmshWithABase("2\n3 7 \"body\"\n2 9 \"the base\"\n"), "msh", {FixedGroup{"the base"}});
+      Fixed(GmshWithABase("2\n3 7 \"body\"\n2 9 \"the base\"\n"), "msh", {FixedGroup{"the base"}});
   ASSERT_TRUE(status.ok()) << status;
-  EXPECT_EQ(named.held, NodesWhere(named, base));
-  const TetMesh numbered = Held(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {FixedGroup{"9"}});
-  EXPECT_EQ(numbered.held, NodesWhere(numbered, base));
-  Held(GmshWithABase("0\n"), "msh", {FixedGroup{"7"}});
+  EXPECT_EQ(named.fixed, NodesWhere(named, base));
+  const TetMesh numbered = Fixed(GmshWithABase("1\n3 7 \"body\"\n"), "msh", {FixedGroup{"9"}});
+  EXPECT_EQ(numbered.fixed, NodesWhere(numbered, base));
+  Fixed(GmshWithABase("0\n"), "msh", {FixedGroup{"7"}});
   EXPECT_THAT(status.ToString(), HasSubstr("it has \"5\", \"9\""))
       << "a volume's number is a material's";
 }
 
-TEST_F(HoldTest, BodyHeldAllOverIsRefused) {
+TEST_F(FixNodesTest, BodyFixedAllOverIsRefused) {
   const std::string box = ToTextGmsh(MakeTetBox(kSize, {2, 1, 1}, 4));
-  Held(box, "msh", {FixedPlane{{0.6, 0, 0}, {1, 0, 0}}, FixedPlane{{0.6, 0, 0}, {-1, 0, 0}}});
-  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
-  Held(box, "msh", {FixedGroup{"body"}});
-  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_HELD: "));
+  Fixed(box, "msh", {FixedPlane{{0.6, 0, 0}, {1, 0, 0}}, FixedPlane{{0.6, 0, 0}, {-1, 0, 0}}});
+  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_FIXED: "));
+  Fixed(box, "msh", {FixedGroup{"body"}});
+  EXPECT_THAT(status.ToString(), HasSubstr("ALL_VERTICES_FIXED: "));
 }
 
 }  // namespace

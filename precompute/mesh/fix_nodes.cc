@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/mesh/hold.h"
+#include "precompute/mesh/fix_nodes.h"
 
 #include <algorithm>
 #include <array>
@@ -30,7 +30,7 @@ double DistanceToSegment(const Point& p, const Point& a, const Point& b) {
 }
 
 absl::Status NoNodeFixed(absl::string_view by, absl::string_view repair) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "NO_VERTEX_HELD",
+  return Refusal(absl::StatusCode::kInvalidArgument, "NO_VERTEX_FIXED",
                  absl::StrCat("no node of the body is fixed by ", by, ": ", repair));
 }
 
@@ -141,7 +141,7 @@ class FixedNodeFinder {
 
   absl::StatusOr<std::vector<int32_t>> Nodes() const {
     if (std::ranges::all_of(is_fixed_, [](bool fixed) { return fixed; })) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "ALL_VERTICES_HELD",
+      return Refusal(absl::StatusCode::kInvalidArgument, "ALL_VERTICES_FIXED",
                      "all nodes of the body are fixed, so that nothing can vibrate: fix less of it "
                      "(the normal of a plane points to the free side)");
     }
@@ -272,13 +272,13 @@ class FixedNodeFinder {
 
 absl::Status FixNodes(const std::vector<Fixture>& fixtures, const SurfaceMesh& given,
                       const MeshNames& names, TetMesh& mesh) {
-  mesh.held.clear();
+  mesh.fixed.clear();
   if (fixtures.empty()) return absl::OkStatus();
   FixedNodeFinder finder(given, names, mesh);
   for (const Fixture& fixture : fixtures) {
     RETURN_IF_ERROR(finder.Take(fixture));
   }
-  ASSIGN_OR_RETURN(mesh.held, finder.Nodes());
+  ASSIGN_OR_RETURN(mesh.fixed, finder.Nodes());
   return absl::OkStatus();
 }
 
