@@ -72,7 +72,7 @@ void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {
   Vector impulse = contact.impulse_on_first_newton_seconds;
   if (swapped) impulse = {-impulse[0], -impulse[1], -impulse[2]};
 
-  v1::EngineContact& row = *step.add_contacts();
+  v1::Contact& row = *step.add_contacts();
   row.set_object(swapped ? heard_1->second : heard_0->second);
   row.set_partner(PartnerNumber(other.body));
   Set(*row.mutable_point_m(), first.point_m);
@@ -97,10 +97,10 @@ void ContactRows::Describe(const ContactSide& silent, v1::HertzContact& hertz) c
 
 void ContactRows::AppendPose(const void* body, const Vector& position_m,
                              const Quaternion& orientation, v1::ContactStep& step) const {
-  v1::ObjectPose& pose = *step.add_poses();
-  pose.set_object(handles_.at(body));
-  Set(*pose.mutable_pose()->mutable_position_m(), position_m);
-  Set(*pose.mutable_pose()->mutable_orientation(), orientation);
+  v1::PoseColumns& poses = *step.mutable_poses();
+  poses.add_object(handles_.at(body));
+  for (const double x : position_m) poses.add_position_m(x);
+  for (const double x : orientation) poses.add_orientation(static_cast<float>(x));
 }
 
 }  // namespace carillon::adapters

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::c {
 namespace {
@@ -34,26 +35,53 @@ void Set(const carillon_vec3& from, v1::Vec3& to) {
   to.set_z(from.z);
 }
 
-void Set(const carillon_contact& from, v1::EngineContact& to) {
+/// Errors: InvalidArgument (INVALID_SETTINGS: no such kind).
+absl::StatusOr<v1::ContactKind> ToKind(carillon_contact_kind kind) {
+  if (kind == CARILLON_CONTACT_REPORTED) return v1::CONTACT_KIND_REPORTED;
+  if (kind == CARILLON_CONTACT_IMPACT) return v1::CONTACT_KIND_IMPACT;
+  if (kind == CARILLON_CONTACT_FORCE) return v1::CONTACT_KIND_FORCE;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                 absl::StrCat("the kind of a contact is ", kind,
+                              ": give CARILLON_CONTACT_REPORTED, _IMPACT or _FORCE"));
+}
+
+bool IsZero(const carillon_vec3& vector) { return vector.x == 0 && vector.y == 0 && vector.z == 0; }
+
+/// Errors: InvalidArgument (INVALID_SETTINGS: an unknown kind, or the vector of another kind).
+absl::Status Set(const carillon_contact& from, v1::Contact& to) {
+  ASSIGN_OR_RETURN(const v1::ContactKind kind, ToKind(from.kind));
+  const bool is_force = kind == v1::CONTACT_KIND_FORCE;
+  if (!IsZero(is_force ? from.impulse_newton_seconds : from.force_newtons)) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   is_force ? "a contact force has impulse_newton_seconds; give force_newtons"
+                            : "a contact with force_newtons is of another kind; give it the kind "
+                              "CARILLON_CONTACT_FORCE, or impulse_newton_seconds");
+  }
+  to.set_kind(kind);
   to.set_object(from.object);
   Set(from.point_m, *to.mutable_point_m());
-  Set(from.impulse_newton_seconds, *to.mutable_impulse_newton_seconds());
+  if (is_force) {
+    Set(from.force_newtons, *to.mutable_force_newtons());
+  } else {
+    Set(from.impulse_newton_seconds, *to.mutable_impulse_newton_seconds());
+  }
   to.set_partner(from.partner);
-  if (from.travel_speed_m_per_s == 0) return;
+  if (from.duration_s != 0) to.set_duration_s(from.duration_s);
+  if (from.travel_speed_m_per_s == 0) return absl::OkStatus();
   to.mutable_roughness()->set_travel_speed_m_per_s(from.travel_speed_m_per_s);
   to.mutable_roughness()->set_depth(from.roughness_depth);
+  return absl::OkStatus();
 }
 
-void Set(const carillon_impulse& from, v1::Impulse& to) {
-  to.set_object(from.object);
-  Set(from.point_m, *to.mutable_point_m());
-  Set(from.impulse_newton_seconds, *to.mutable_impulse_newton_seconds());
-  if (from.duration_s != 0) to.set_duration_s(from.duration_s);
-}
-
-void Set(const carillon_pose& from, v1::ObjectPose& to) {
-  to.set_object(from.object);
-  *to.mutable_pose() = ToPose(from);
+void Append(const carillon_pose& from, v1::PoseColumns& to) {
+  to.add_object(from.object);
+  for (const double x : {from.position_m.x, from.position_m.y, from.position_m.z}) {
+    to.add_position_m(x);
+  }
+  const carillon_quaternion& turn = from.orientation;
+  for (const double x : {turn.w, turn.x, turn.y, turn.z}) {
+    to.add_orientation(static_cast<float>(x));
+  }
 }
 
 }  // namespace
@@ -122,16 +150,18 @@ absl::StatusOr<std::string> MakeObj(std::span<const double> vertices_m,
 
 absl::StatusOr<v1::ContactStep> ToStep(const carillon_step& step) {
   if ((step.contacts == nullptr && step.contact_count > 0) ||
-      (step.impulses == nullptr && step.impulse_count > 0) ||
       (step.poses == nullptr && step.pose_count > 0)) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    "an array of the step is a null pointer, and its count is above zero");
   }
   v1::ContactStep made;
   made.set_time_s(step.time_s);
-  for (size_t i = 0; i < step.contact_count; ++i) Set(step.contacts[i], *made.add_contacts());
-  for (size_t i = 0; i < step.impulse_count; ++i) Set(step.impulses[i], *made.add_impulses());
-  for (size_t i = 0; i < step.pose_count; ++i) Set(step.poses[i], *made.add_poses());
+  for (const carillon_contact& contact : std::span(step.contacts, step.contact_count)) {
+    RETURN_IF_ERROR(Set(contact, *made.add_contacts()));
+  }
+  for (const carillon_pose& pose : std::span(step.poses, step.pose_count)) {
+    Append(pose, *made.mutable_poses());
+  }
   if (step.listener != nullptr) *made.mutable_listener() = ToPose(*step.listener);
   return made;
 }

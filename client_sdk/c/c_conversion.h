@@ -43,7 +43,7 @@ void Fill(const carillon_hearing* hearing, Message& message) {
   *message.mutable_listener() = ToPose(hearing->listener);
 }
 
-/// Errors: InvalidArgument (INVALID_SETTINGS: a null array of elements).
+/// Errors: InvalidArgument (INVALID_SETTINGS: a null array of elements, or an unknown kind).
 absl::StatusOr<v1::ContactStep> ToStep(const carillon_step& step);
 
 /// Checks the length of a simulator's steps, seconds. Errors: InvalidArgument (INVALID_STREAM).

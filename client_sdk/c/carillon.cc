@@ -179,8 +179,8 @@ carillon_code carillon_create_scene(carillon_client* client, const carillon_hear
     if (!client || !scene) return Missing("an argument");
     v1::CreateSceneRequest request;
     carillon::c::Fill(hearing, request);
-    ASSIGN_OR_RETURN(std::string name, client->daemon->CreateScene(request));
-    *scene = new carillon_scene{*client->daemon, std::move(name)};
+    ASSIGN_OR_RETURN(const auto created, client->daemon->CreateScene(request));
+    *scene = new carillon_scene{*client->daemon, created.name()};
     return absl::OkStatus();
   });
 }
@@ -219,11 +219,11 @@ carillon_code carillon_add_object(carillon_scene* scene, const carillon_object* 
                                   uint32_t* handle) {
   return Try([&]() -> absl::Status {
     if (!scene || !object || !object->model || !object->material) return Missing("an argument");
-    v1::AddObjectRequest request;
+    v1::AddObjectsRequest request;
     request.set_scene(scene->name);
-    carillon::c::Fill(*object, request);
-    ASSIGN_OR_RETURN(const v1::SoundingObject added, scene->daemon.AddObject(request));
-    if (handle != nullptr) *handle = added.handle();
+    carillon::c::Fill(*object, *request.add_objects());
+    ASSIGN_OR_RETURN(const auto added, scene->daemon.AddObjects(request));
+    if (handle != nullptr) *handle = added.front().handle();
     return absl::OkStatus();
   });
 }

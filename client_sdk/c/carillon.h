@@ -68,24 +68,30 @@ typedef struct carillon_object {
   uint32_t handle;      /**< wanted in contacts; zero: the next free one */
 } carillon_object;
 
-/** A contact that a physics engine reports. Report it in every step while the bodies touch, even if
- * they do not move. Set unused members to zero. */
+/** The kinds of contacts. */
+typedef int32_t carillon_contact_kind;
+enum {
+  /** As a physics engine reports it. Report it in every step while the bodies touch, even if they
+   * do not move: the daemon tells impacts from resting contacts. */
+  CARILLON_CONTACT_REPORTED = 0,
+  CARILLON_CONTACT_IMPACT = 1, /**< a blow that the caller intends, such as that of a hammer */
+  /** A contact force that rests, slides or rolls. Report it in every step until it ends. */
+  CARILLON_CONTACT_FORCE = 2
+};
+
+/** A contact. Set unused members to zero. */
 typedef struct carillon_contact {
+  carillon_contact_kind kind;
   uint32_t object;
   carillon_vec3 point_m;
-  carillon_vec3 impulse_newton_seconds; /**< on the object over the step, friction included */
-  uint32_t partner; /**< any number that names the other body, the same one in each step */
+  /** On the object, friction included: of an impact, or of a reported contact over the step. */
+  carillon_vec3 impulse_newton_seconds;
+  carillon_vec3 force_newtons; /**< on the object, of a contact force; otherwise unused */
+  uint32_t partner;  /**< any number that names the other body, the same one in each step */
+  double duration_s; /**< of an impact; zero: as long as the collision of two elastic bodies */
   double travel_speed_m_per_s; /**< along a rough surface; zero: no roughness */
   double roughness_depth;      /**< relative to the force */
 } carillon_contact;
-
-/** A blow that the caller intends, such as that of a hammer. */
-typedef struct carillon_impulse {
-  uint32_t object;
-  carillon_vec3 point_m;
-  carillon_vec3 impulse_newton_seconds;
-  double duration_s; /**< zero: as long as an elastic collision with steel */
-} carillon_impulse;
 
 /** The place and the rotation of an object, or of the listener, in the scene's frame. */
 typedef struct carillon_pose {
@@ -119,8 +125,6 @@ typedef struct carillon_step {
   double time_s;
   const carillon_contact* contacts;
   size_t contact_count;
-  const carillon_impulse* impulses;
-  size_t impulse_count;
   const carillon_pose* poses;
   size_t pose_count;
   const carillon_pose* listener; /**< its pose now; null: the listener stays */

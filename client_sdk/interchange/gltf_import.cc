@@ -21,6 +21,7 @@
 #include "client_sdk/interchange/gltf_nodes.h"
 #include "client_sdk/interchange/gltf_surface.h"
 #include "client_sdk/interchange/header_json.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/utf8.h"
 
@@ -216,11 +217,11 @@ void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel&
   for (float& x : model.given_vertices) x = static_cast<float>(x * chosen.metres_per_unit);
 }
 
-/// Returns the longest beginning of a name that has at most 200 bytes, the limit of labels, and no
-/// incomplete character.
+/// Returns the longest beginning of a name that has at most kMaxLabelBytes and no incomplete
+/// character.
 std::string ShortText(const json& value) {
   std::string text = Text(value);
-  size_t size = std::min<size_t>(text.size(), 200);
+  size_t size = std::min(text.size(), kMaxLabelBytes);
   while (size < text.size() && ContinuesCharacter(text[size])) --size;
   text.resize(size);
   return text;

@@ -105,14 +105,14 @@ class Client:
             raise Refused(job.error)
         return job.modal_model
 
-    def strike(self, scene, impulses):
+    def strike(self, scene, impacts):
         """Strikes objects of a scene at once, without a delay; returns the daemon's counts."""
         start = contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.001,
                                                        scheduling_delay_s=0)
-        step = contact_pb2.ContactStep(impulses=impulses)
+        step = contact_pb2.ContactStep(contacts=impacts)
         *_, last = self.contacts.StreamContacts(iter((
             contact_service_pb2.StreamContactsRequest(start=start),
-            contact_service_pb2.StreamContactsRequest(step=step))))
+            contact_service_pb2.StreamContactsRequest(steps=[step]))))
         if last.rejected_count:
             raise Refused(last.last_rejection)
         return last
@@ -171,15 +171,17 @@ def strike_and_listen(client, model, options):
     scene = client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest(
         hearing=hearing if options.at else None)).name
     try:
-        added = client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=model, material=material_pb2.Material(preset=options.material),
-            pose=pose if options.at else None))
-        impulse = contact_pb2.Impulse(
-            object=added.object.handle, point_m=contact_pb2.Vec3(**dict(zip("xyz", options.point))),
+        added = client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene, objects=[scene_service_pb2.NewObject(
+                modal_model=model, material=material_pb2.Material(preset=options.material),
+                pose=pose if options.at else None)]))
+        impulse = contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=added.objects[0].handle,
+            point_m=contact_pb2.Vec3(**dict(zip("xyz", options.point))),
             impulse_newton_seconds=contact_pb2.Vec3(**dict(zip("xyz", options.impulse))),
             duration_s=options.duration, hertz=contact_pb2.HertzContact(striker=options.striker))
-        print(f"{added.object.sounding_mode_count} modes sound, the lowest at "
-              f"{added.object.lowest_frequency_hz:.2f} Hz")
+        print(f"{added.objects[0].sounding_mode_count} modes sound, the lowest at "
+              f"{added.objects[0].lowest_frequency_hz:.2f} Hz")
         return client.listen(options.seconds, on_start=lambda: client.strike(scene, [impulse]))
     finally:
         client.scenes.DeleteScene(scene_service_pb2.DeleteSceneRequest(name=scene))

@@ -12,7 +12,8 @@ install(DIRECTORY client_sdk/cpp/include/carillon TYPE INCLUDE COMPONENT sdk)
 # The C interface: carillon.h, libcarillon.so.
 install(TARGETS carillon_c LIBRARY COMPONENT sdk NAMELINK_COMPONENT sdk PUBLIC_HEADER COMPONENT sdk)
 install(DIRECTORY ${PROJECT_BINARY_DIR}/proto/carillon TYPE INCLUDE COMPONENT sdk
-        FILES_MATCHING PATTERN "*.pb.h" PATTERN "*.grpc.pb.h" EXCLUDE)
+        FILES_MATCHING PATTERN "*.pb.h" PATTERN "*.grpc.pb.h" EXCLUDE
+        PATTERN worker EXCLUDE)
 install(EXPORT carillonTargets NAMESPACE carillon:: DESTINATION ${package_folder} COMPONENT sdk)
 configure_package_config_file(deploy/cmake/carillonConfig.cmake.in carillonConfig.cmake
                               INSTALL_DESTINATION ${package_folder} NO_SET_AND_CHECK_MACRO)
@@ -26,7 +27,7 @@ configure_file(deploy/cmake/carillon-client.pc.in carillon-client.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/carillon-client.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
         COMPONENT sdk)
 # The contract, for clients in other languages.
-install(DIRECTORY proto/carillon DESTINATION ${CMAKE_INSTALL_DATADIR}/carillon/proto COMPONENT sdk
+install(DIRECTORY proto/carillon/v1 DESTINATION ${CMAKE_INSTALL_DATADIR}/carillon/proto/carillon COMPONENT sdk
         FILES_MATCHING PATTERN "*.proto")
 
 if(CARILLON_CLI)

@@ -36,7 +36,7 @@ void WarnOfMoreNodes(int asked, const TetMesh& mesh, std::vector<std::string>& w
 }
 
 absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing,
-                                 const v1::WorkerRequest& request) {
+                                 const worker::v1::WorkerRequest& request) {
   ASSIGN_OR_RETURN(TetMesh mesh, Tetrahedralize(surface.prepared.surface, meshing));
   for (BoundaryFace& face : mesh.boundary) {
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
@@ -50,7 +50,7 @@ absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings&
 }
 
 absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
-                                    const v1::WorkerRequest& request) {
+                                    const worker::v1::WorkerRequest& request) {
   const int nodes_per_element = MeshingOf(request).nodes_per_element;
   if (mesh.nodes_per_element > nodes_per_element) {
     return Refusal(
@@ -66,7 +66,7 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
 }
 
 /// Whether the surface may get other triangles. Fixtures can name vertices of the given ones.
-bool MayCoarsen(const v1::WorkerRequest& request) {
+bool MayCoarsen(const worker::v1::WorkerRequest& request) {
   const v1::MeshSettings& mesh = request.settings().mesh();
   const std::vector<Fixture> fixtures = FixturesOf(request);
   return !mesh.has_keep_surface() && mesh.accuracy() == 0 &&
@@ -91,7 +91,7 @@ double ExtentOf(const Mesh& mesh) {
 
 }  // namespace
 
-absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerRequest& request,
+absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::WorkerRequest& request,
                                 DecompositionObserver& observer) {
   observer.OnProgress(v1::PHASE_READ, 0);
   const v1::DecompositionSettings& settings = request.settings();
@@ -118,7 +118,7 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerReques
 }
 
 absl::StatusOr<Body> Fill(const Fillable& surface, MeshingSettings meshing,
-                          const v1::WorkerRequest& request) {
+                          const worker::v1::WorkerRequest& request) {
   const double most_node_count = std::exchange(meshing.most_node_count, 0);
   if (!meshing.relative_size.is_uniform()) {
     MeshingSettings limited = meshing;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/mesh/mesh_names.h"
 #include "precompute/mesh/surface/prepare_surface.h"
@@ -38,13 +38,13 @@ using Input = std::variant<Fillable, Body>;
 /// Reads the bytes of a mesh file, and prepares a surface as `request` wants it. Errors: those of
 /// ParseMesh, CheckUnit, PrepareSurface and FixNodes; INVALID_SETTINGS if linear elements are
 /// requested but the mesh has ten-node elements.
-absl::StatusOr<Input> ReadInput(const std::string& bytes, const v1::WorkerRequest& request,
+absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::WorkerRequest& request,
                                 DecompositionObserver& observer);
 
 /// Fills a surface with tetrahedra, and finds the nodes that are fixed. If a graded mesh would have
 /// more nodes than `meshing` allows it, which the prediction can be wrong about for walls, the mesh
 /// becomes uniform. Errors: those of Tetrahedralize and FixNodes.
 absl::StatusOr<Body> Fill(const Fillable& surface, MeshingSettings meshing,
-                          const v1::WorkerRequest& request);
+                          const worker::v1::WorkerRequest& request);
 
 }  // namespace carillon::precompute

@@ -18,7 +18,7 @@ namespace carillon::precompute {
 namespace {
 
 /// Solves a surface in rounds, and a mesh of tetrahedra as it is.
-absl::StatusOr<ModalModel> SolveInput(Input input, const v1::WorkerRequest& request,
+absl::StatusOr<ModalModel> SolveInput(Input input, const worker::v1::WorkerRequest& request,
                                       DecompositionObserver& observer) {
   if (const auto* surface = std::get_if<Fillable>(&input)) {
     return Rounds(*surface, request, observer).Run();
@@ -30,7 +30,8 @@ absl::StatusOr<ModalModel> SolveInput(Input input, const v1::WorkerRequest& requ
 
 /// Leaves out what the request does not want, and adds the warnings about the rest. Errors:
 /// NO_MODE_IN_BAND, ACCURACY_NOT_REACHED.
-absl::Status CheckModel(const v1::WorkerRequest& request, double used_cpu_s, ModalModel& model) {
+absl::Status CheckModel(const worker::v1::WorkerRequest& request, double used_cpu_s,
+                        ModalModel& model) {
   const IntendedUse use = UseOf(request);
   RETURN_IF_ERROR(CheckBand(model, use));
   WarnOfAccuracy(GoalOf(request), model);
@@ -44,7 +45,8 @@ absl::Status CheckModel(const v1::WorkerRequest& request, double used_cpu_s, Mod
 
 }  // namespace
 
-absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerRequest& request,
+absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes,
+                                     const worker::v1::WorkerRequest& request,
                                      DecompositionObserver& observer) {
   const double begun_cpu_s = PhaseClock::Now().cpu_seconds;
   ASSIGN_OR_RETURN(Input input, ReadInput(std::exchange(mesh_bytes, {}), request, observer));

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/pipeline/decomposition_observer.h"
 
@@ -20,7 +20,8 @@ namespace carillon::precompute {
 /// NO_MODE_IN_BAND with the figure first_mode_hz; INVALID_SETTINGS if linear elements are requested
 /// but the mesh has ten-node elements; OUTPUT_NOT_WRITABLE. The mesh generator may also crash the
 /// process.
-absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes, const v1::WorkerRequest& request,
+absl::StatusOr<ModalModel> Decompose(std::string mesh_bytes,
+                                     const worker::v1::WorkerRequest& request,
                                      DecompositionObserver& observer);
 
 }  // namespace carillon::precompute

@@ -18,7 +18,7 @@ double DefaultRadiationBudget(const ModalModel& model) {
   return std::clamp(modes_s, 20.0, 600.0);
 }
 
-absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
+absl::StatusOr<Transfer> Radiate(const ModalModel& model, const worker::v1::WorkerRequest& request,
                                  DecompositionObserver& observer) {
   const IntendedUse use = UseOf(request);
   const Air air;

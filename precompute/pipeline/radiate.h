@@ -2,7 +2,7 @@
 #pragma once
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/pipeline/decomposition_observer.h"
 #include "precompute/radiation/transfer.h"
@@ -16,7 +16,7 @@ double DefaultRadiationBudget(const ModalModel& model);
 /// Computes the radiation of the model's modes in the band of the completed `request`, for the
 /// speed ratio of the request's material and with the settings in request.transfer(). Fails with
 /// the errors of ComputeTransfer.
-absl::StatusOr<Transfer> Radiate(const ModalModel& model, const v1::WorkerRequest& request,
+absl::StatusOr<Transfer> Radiate(const ModalModel& model, const worker::v1::WorkerRequest& request,
                                  DecompositionObserver& observer);
 
 }  // namespace carillon::precompute

@@ -17,7 +17,7 @@ namespace {
 
 /// A refused request.
 struct Refused {
-  const v1::WorkerRequest& request;
+  const worker::v1::WorkerRequest& request;
   v1::ErrorInfo error;
 
   /// Returns a figure of the refusal, or `otherwise` if the refusal has none of this name.
@@ -44,7 +44,7 @@ std::string RoundedWhole(double value) {
 /// The lower end of the band that an option with the upper end alone means.
 constexpr double kUsualLowestHz = 20;
 
-double TopOfBandHz(const v1::WorkerRequest& request) { return UseOf(request).high_hz; }
+double TopOfBandHz(const worker::v1::WorkerRequest& request) { return UseOf(request).high_hz; }
 
 /// Returns a band's upper end with two digits, at most as high as given.
 std::string RoundedDown(double value) {
@@ -53,7 +53,9 @@ std::string RoundedDown(double value) {
   return absl::StrFormat("%.0f", unit * std::floor(value / unit));
 }
 
-double SizeOf(const v1::WorkerRequest& request) { return request.size() > 0 ? request.size() : 1; }
+double SizeOf(const worker::v1::WorkerRequest& request) {
+  return request.size() > 0 ? request.size() : 1;
+}
 
 /// A wall of this part of the body's diagonal is thin, and thick enough to be meshed.
 constexpr double kWallPart = 0.02;
@@ -205,7 +207,7 @@ std::vector<Known> RemediesOf(const std::string& reason) {
 
 }  // namespace
 
-absl::Status WithRemedies(absl::Status refusal, const v1::WorkerRequest& request) {
+absl::Status WithRemedies(absl::Status refusal, const worker::v1::WorkerRequest& request) {
   const Refused refused{request, ToErrorInfo(refusal)};
   for (const Known& known : RemediesOf(refused.error.reason())) {
     if (known.useless(refused)) continue;

@@ -49,7 +49,7 @@ SizeField Grade(const TetMesh& mesh, const ModalModel& model, const Round& last,
 constexpr double kMostOfUniform = 0.9;
 
 /// Returns the settings of the first mesh.
-MeshingSettings FirstMeshing(const v1::WorkerRequest& request) {
+MeshingSettings FirstMeshing(const worker::v1::WorkerRequest& request) {
   MeshingSettings meshing = MeshingOf(request);
   if (GoalOf(request).given() && meshing.target_node_count == 0) {
     meshing.target_node_count = kFirstCornerNodeCount;
@@ -62,7 +62,7 @@ constexpr int kCoarseCornerCount = 300;
 
 }  // namespace
 
-Rounds::Rounds(const Fillable& surface, const v1::WorkerRequest& request,
+Rounds::Rounds(const Fillable& surface, const worker::v1::WorkerRequest& request,
                DecompositionObserver& observer)
     : surface_(surface),
       request_(request),

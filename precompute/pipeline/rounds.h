@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/pipeline/body.h"
@@ -21,7 +21,7 @@ namespace carillon::precompute {
 /// this one.
 class Rounds {
  public:
-  Rounds(const Fillable& surface, const v1::WorkerRequest& request,
+  Rounds(const Fillable& surface, const worker::v1::WorkerRequest& request,
          DecompositionObserver& observer);
 
   /// Returns the model of the best mesh. If no mode can lie in the band, the model is that of the
@@ -41,7 +41,7 @@ class Rounds {
   Next Plan(const Solved& solved);
 
   const Fillable& surface_;
-  const v1::WorkerRequest& request_;
+  const worker::v1::WorkerRequest& request_;
   DecompositionObserver& observer_;
   const bool is_free_;
   const ResolutionGoal asked_;

@@ -19,7 +19,7 @@
 namespace carillon::precompute {
 namespace {
 
-SolveOptions OptionsOf(const v1::WorkerRequest& request, DecompositionObserver& observer) {
+SolveOptions OptionsOf(const worker::v1::WorkerRequest& request, DecompositionObserver& observer) {
   const bool may_lower_band =
       UseOf(request).high_is_default && request.settings().keep_mode_count() == 0;
   return {.max_mode_count =
@@ -29,7 +29,7 @@ SolveOptions OptionsOf(const v1::WorkerRequest& request, DecompositionObserver& 
 }
 
 absl::StatusOr<DeformationModes> FindModes(const SystemMatrices& system, const TetMesh& mesh,
-                                           const v1::WorkerRequest& request,
+                                           const worker::v1::WorkerRequest& request,
                                            DecompositionObserver& observer) {
   const IntendedUse use = UseOf(request);
   return SolveDeformationModes(
@@ -39,13 +39,13 @@ absl::StatusOr<DeformationModes> FindModes(const SystemMatrices& system, const T
 }
 
 /// The elasticity of unit Young's modulus.
-ElasticConstants ElasticOf(const v1::WorkerRequest& request) {
+ElasticConstants ElasticOf(const worker::v1::WorkerRequest& request) {
   return {.young_pa = 1, .poisson_ratio = request.settings().poisson_ratio()};
 }
 
 /// The model of a solved body, with what is to be said about it so far.
 ModalModel MakeModel(const Body& body, const SystemMatrices& system,
-                     const DeformationModes& solution, const v1::WorkerRequest& request) {
+                     const DeformationModes& solution, const worker::v1::WorkerRequest& request) {
   const v1::DecompositionSettings& settings = request.settings();
   std::optional<SpectraCheck> check;
   if (settings.check_with() == v1::SOLVER_SPECTRA) {
@@ -68,13 +68,13 @@ constexpr size_t kMostDividedNodes = 3000;
 
 }  // namespace
 
-bool IsFinenessFree(const v1::WorkerRequest& request) {
+bool IsFinenessFree(const worker::v1::WorkerRequest& request) {
   const v1::MeshSettings& mesh = request.settings().mesh();
   return !GoalOf(request).given() && mesh.target_node_count() == 0 && !mesh.keep_surface() &&
          MeshingOf(request).nodes_per_element == 10;
 }
 
-absl::StatusOr<Solved> SolveBody(Body body, const v1::WorkerRequest& request,
+absl::StatusOr<Solved> SolveBody(Body body, const worker::v1::WorkerRequest& request,
                                  DecompositionObserver& observer) {
   observer.OnMesh(body.mesh.nodes.size());
   observer.OnProgress(v1::PHASE_ASSEMBLE, 0);
@@ -85,7 +85,8 @@ absl::StatusOr<Solved> SolveBody(Body body, const v1::WorkerRequest& request,
   return Solved{std::move(body), std::move(model), modes.predicted_cpu_s};
 }
 
-void CheckFewElements(const Fillable* surface, const v1::WorkerRequest& request, Solved& solved) {
+void CheckFewElements(const Fillable* surface, const worker::v1::WorkerRequest& request,
+                      Solved& solved) {
   auto& [body, model, predicted_cpu_s] = solved;
   const bool can_compare =
       surface == nullptr ? body.mesh.nodes.size() <= kMostDividedNodes : !IsFinenessFree(request);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "precompute/modes/modal_model.h"
 #include "precompute/pipeline/body.h"
 #include "precompute/pipeline/decomposition_observer.h"
@@ -19,15 +19,16 @@ struct Solved {
 
 /// Computes the model of one body: its matrices, their modes, and what they mean for the surface.
 /// Errors: those of SolveDeformationModes.
-absl::StatusOr<Solved> SolveBody(Body body, const v1::WorkerRequest& request,
+absl::StatusOr<Solved> SolveBody(Body body, const worker::v1::WorkerRequest& request,
                                  DecompositionObserver& observer);
 
 /// Compares the modes of a mesh of few elements with those of a mesh of ordinary elements: of the
 /// surface, if the body has one that can be filled, or of the mesh's divided elements.
-void CheckFewElements(const Fillable* surface, const v1::WorkerRequest& request, Solved& solved);
+void CheckFewElements(const Fillable* surface, const worker::v1::WorkerRequest& request,
+                      Solved& solved);
 
 /// Returns whether the request leaves the fineness of the mesh to the program. Linear elements are
 /// left as they are, because they serve comparisons.
-bool IsFinenessFree(const v1::WorkerRequest& request);
+bool IsFinenessFree(const worker::v1::WorkerRequest& request);
 
 }  // namespace carillon::precompute

@@ -39,11 +39,11 @@ absl::Status CheckTransfer(const v1::TransferSettings& transfer) {
 }
 
 /// Upper end of the band, whether somebody asked for it or not.
-double HighestHz(const v1::WorkerRequest& request) {
+double HighestHz(const worker::v1::WorkerRequest& request) {
   return request.max_frequency_hz() == 0 ? kHighestHz : request.max_frequency_hz();
 }
 
-absl::Status CheckUse(const v1::WorkerRequest& request) {
+absl::Status CheckUse(const worker::v1::WorkerRequest& request) {
   if (!(request.size() > 0) || !std::isfinite(request.size())) {
     return Invalid(absl::StrCat("size is ", request.size(), "; it must be above zero"));
   }
@@ -62,7 +62,7 @@ absl::Status CheckUse(const v1::WorkerRequest& request) {
 
 }  // namespace
 
-absl::StatusOr<v1::WorkerRequest> Complete(v1::WorkerRequest request) {
+absl::StatusOr<worker::v1::WorkerRequest> Complete(worker::v1::WorkerRequest request) {
   FillInDefaults(*request.mutable_settings());
   if (request.size() == 0) request.set_size(1);
   if (!request.radiate_stored_model()) RETURN_IF_ERROR(CheckSettings(request.settings()));
@@ -75,18 +75,18 @@ absl::StatusOr<v1::WorkerRequest> Complete(v1::WorkerRequest request) {
   return request;
 }
 
-absl::StatusOr<v1::WorkerRequest> ReadWorkerRequest(const std::string& path) {
+absl::StatusOr<worker::v1::WorkerRequest> ReadWorkerRequest(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file.is_open() || file.bad()) {
     return Invalid(
         absl::StrCat("the request ", path, " cannot be read; check its name and its permissions"));
   }
-  ASSIGN_OR_RETURN(v1::WorkerRequest request, ParseWorkerRequest(text));
+  ASSIGN_OR_RETURN(worker::v1::WorkerRequest request, ParseWorkerRequest(text));
   return Complete(std::move(request));
 }
 
-IntendedUse UseOf(const v1::WorkerRequest& request) {
+IntendedUse UseOf(const worker::v1::WorkerRequest& request) {
   const v1::Material& material = request.material();
   return {.young_pa = material.young_pa(),
           .density_kg_per_m3 = material.density_kg_per_m3(),
@@ -99,7 +99,7 @@ IntendedUse UseOf(const v1::WorkerRequest& request) {
           .loss_factor = LossFactorOf(material)};
 }
 
-MeshingSettings MeshingOf(const v1::WorkerRequest& request) {
+MeshingSettings MeshingOf(const worker::v1::WorkerRequest& request) {
   const v1::MeshSettings& mesh = request.settings().mesh();
   MeshingSettings meshing{
       .target_node_count = static_cast<int>(mesh.target_node_count()),
@@ -109,19 +109,19 @@ MeshingSettings MeshingOf(const v1::WorkerRequest& request) {
   return meshing;
 }
 
-ResolutionGoal GoalOf(const v1::WorkerRequest& request) {
+ResolutionGoal GoalOf(const worker::v1::WorkerRequest& request) {
   const v1::MeshSettings& mesh = request.settings().mesh();
   return {.accuracy = mesh.accuracy(),
           .budget_s = mesh.budget_s(),
           .budget_bytes = mesh.budget_gib() * kBytesPerGib};
 }
 
-MassSharing MassSharingOf(const v1::WorkerRequest& request) {
+MassSharing MassSharingOf(const worker::v1::WorkerRequest& request) {
   return request.settings().mass_matrix() == v1::MASS_MATRIX_LUMPED ? MassSharing::kLumped
                                                                     : MassSharing::kConsistent;
 }
 
-std::vector<Fixture> FixturesOf(const v1::WorkerRequest& request) {
+std::vector<Fixture> FixturesOf(const worker::v1::WorkerRequest& request) {
   std::vector<Fixture> fixtures;
   for (const v1::Fixture& fixture : request.settings().fixtures()) {
     fixtures.push_back(FromProto(fixture));

@@ -77,12 +77,12 @@ void AddMaterialOptions(CLI::App& app, Options& options) {
 }
 
 /// Zero means the default to the request, but a person who writes it errs.
-void SetSize(double size, v1::WorkerRequest& request) {
+void SetSize(double size, worker::v1::WorkerRequest& request) {
   if (!(size > 0)) throw CLI::ValidationError("--size", "it must be above zero");
   request.set_size(size);
 }
 
-void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) {
+void AddUseOptions(CLI::App& app, Options& options, worker::v1::WorkerRequest& request) {
   app.add_option(
          "--format", options.format,
          "obj, ply, stl, off, glb, gltf, msh (Gmsh), mesh (Medit), node (TetGen) or inp (Abaqus, "
@@ -104,7 +104,7 @@ void AddUseOptions(CLI::App& app, Options& options, v1::WorkerRequest& request) 
       ->group(kUseGroup);
 }
 
-void AddRadiationOptions(CLI::App& app, v1::WorkerRequest& request) {
+void AddRadiationOptions(CLI::App& app, worker::v1::WorkerRequest& request) {
   app.add_flag_function(
          "--transfer", [&](int64_t) { request.mutable_transfer(); },
          "Compute how each mode radiates into the air, too, for the material's speed of sound: "
@@ -254,7 +254,7 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
 /// Lower end of the band where nobody asks for one. An upper end of zero is the default.
 constexpr double kUsualLowestHz = 20;
 
-absl::Status SetBand(const std::string& band, v1::WorkerRequest& request) {
+absl::Status SetBand(const std::string& band, worker::v1::WorkerRequest& request) {
   if (band.empty()) {
     request.set_min_frequency_hz(kUsualLowestHz);
     return absl::OkStatus();
@@ -280,8 +280,9 @@ std::string FormatOf(const std::string& format, const std::string& file) {
   return named == "ele" ? "node" : named;
 }
 
-absl::StatusOr<v1::WorkerRequest> MakeRequest(const Options& options, const std::string& mesh_file,
-                                              v1::WorkerRequest request) {
+absl::StatusOr<worker::v1::WorkerRequest> MakeRequest(const Options& options,
+                                                      const std::string& mesh_file,
+                                                      worker::v1::WorkerRequest request) {
   if (!options.request_file.empty()) return ReadWorkerRequest(options.request_file);
   ASSIGN_OR_RETURN(*request.mutable_material(), MakeMaterial(options));
   request.mutable_settings()->set_poisson_ratio(request.material().poisson_ratio());

@@ -3,12 +3,13 @@
 
 #include <google/protobuf/util/delimited_message_util.h>
 
+#include "carillon/worker/v1/worker.pb.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::precompute {
 namespace {
 
-void Send(int descriptor, const v1::WorkerEvent& event) {
+void Send(int descriptor, const worker::v1::WorkerEvent& event) {
   if (descriptor < 0) return;
   google::protobuf::util::SerializeDelimitedToFileDescriptor(event, descriptor);
 }
@@ -16,13 +17,13 @@ void Send(int descriptor, const v1::WorkerEvent& event) {
 }  // namespace
 
 void WorkerEvents::SendProgress(const v1::Progress& progress) const {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   *event.mutable_progress() = progress;
   Send(descriptor_, event);
 }
 
 void WorkerEvents::SendError(const absl::Status& status) const {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   *event.mutable_error() = ToErrorInfo(status);
   Send(descriptor_, event);
 }

@@ -7,7 +7,7 @@
 namespace carillon::precompute {
 
 /// Sends the progress and the error of the work to the process that started this one, as delimited
-/// WorkerEvent messages (proto/carillon/v1/decomposition.proto) on an open descriptor. Only one
+/// WorkerEvent messages (proto/carillon/worker/v1/worker.proto) on an open descriptor. Only one
 /// thread may send at a time. It is no error if the reader has gone away, because the result may
 /// still be wanted.
 class WorkerEvents {

@@ -27,7 +27,7 @@ class FirstError : public google::protobuf::io::ErrorCollector {
 
 }  // namespace
 
-std::string WorkerRequestText(const v1::WorkerRequest& request) {
+std::string WorkerRequestText(const worker::v1::WorkerRequest& request) {
   TextFormat::Printer printer;
   printer.SetUseShortRepeatedPrimitives(true);
   std::string text;
@@ -35,8 +35,8 @@ std::string WorkerRequestText(const v1::WorkerRequest& request) {
   return text;
 }
 
-absl::StatusOr<v1::WorkerRequest> ParseWorkerRequest(absl::string_view text) {
-  v1::WorkerRequest request;
+absl::StatusOr<worker::v1::WorkerRequest> ParseWorkerRequest(absl::string_view text) {
+  worker::v1::WorkerRequest request;
   FirstError error;
   TextFormat::Parser parser;
   parser.RecordErrorsTo(&error);

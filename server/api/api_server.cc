@@ -215,10 +215,10 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
                                           &scenes, &contacts, &audio,          &server_info};
   reflection = MakeReflectionServices(
       {v1::AdminService::service_full_name(), v1::ModalModelService::service_full_name(),
-       v1::DecompositionService::service_full_name(), v1::JobRunService::service_full_name(),
-       v1::SceneService::service_full_name(), v1::ContactService::service_full_name(),
-       v1::AudioService::service_full_name(), v1::ServerService::service_full_name(),
-       "grpc.health.v1.Health"});
+       v1::DecompositionService::service_full_name(),
+       worker::v1::JobRunService::service_full_name(), v1::SceneService::service_full_name(),
+       v1::ContactService::service_full_name(), v1::AudioService::service_full_name(),
+       v1::ServerService::service_full_name(), "grpc.health.v1.Health"});
   for (const auto& service : reflection) services.push_back(service.get());
   edge.emplace(EdgeOf(settings), certificate_end, client_log);
   return edge->Serve(services, refusing);

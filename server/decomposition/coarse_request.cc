@@ -4,6 +4,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/mesh_format.h"
 #include "server/decomposition/memory_estimate.h"
 #include "server/mode_database/model_store.h"

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_format.h"
 #include "proto/cpp/status_macros.h"

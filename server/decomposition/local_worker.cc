@@ -144,7 +144,7 @@ void LocalWorker::Read(nanoseconds now) {
   const std::string bytes = event_pipe_.Read(kReadBytes);
   event_byte_count_ += bytes.size();
   const absl::Status status =
-      events_.Feed(bytes, [&](const v1::WorkerEvent& event) { OnEvent(event, now); });
+      events_.Feed(bytes, [&](const worker::v1::WorkerEvent& event) { OnEvent(event, now); });
   const auto seconds = static_cast<uint64_t>(Seconds(now - started_));
   if (!status.ok()) {
     Kill(Verdict::kCrashed, ToErrorInfo(status));
@@ -158,7 +158,7 @@ void LocalWorker::Read(nanoseconds now) {
   if (log_.size() > kLogBytes) log_.erase(0, log_.size() - kLogBytes);
 }
 
-void LocalWorker::OnEvent(const v1::WorkerEvent& event, nanoseconds now) {
+void LocalWorker::OnEvent(const worker::v1::WorkerEvent& event, nanoseconds now) {
   last_look_ = now;
   silence_ = {};
   if (event.has_error()) {

@@ -11,6 +11,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "proto/cpp/program/child_process.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/worker_events.h"
@@ -108,7 +109,7 @@ class LocalWorker {
         started_(now),
         last_look_(now) {}
 
-  void OnEvent(const v1::WorkerEvent& event, std::chrono::nanoseconds now);
+  void OnEvent(const worker::v1::WorkerEvent& event, std::chrono::nanoseconds now);
   void OnProgress(v1::Progress progress);
   void CountSilence(std::chrono::nanoseconds now);
   void Kill(Verdict verdict, v1::ErrorInfo error);

@@ -117,12 +117,12 @@ absl::Status RunUpload::CheckWhole() const {
                              : state_->checker.Finish();
 }
 
-absl::Status RunUpload::Finish(const v1::RunEnd& end) {
+absl::Status RunUpload::Finish(const worker::v1::RunEnd& end) {
   if (end.exit_status() == 0 && !end.has_error()) {
     RETURN_IF_ERROR(CheckWhole());
     if (!state_->model || !Sync(state_->File("model"))) return NotWritable(state_->File("model"));
   }
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   if (end.has_error()) *event.mutable_error() = end.error();
   const std::string events = end.has_error() ? Delimited(event) : "";
   const std::filesystem::path ending = state_->File("ending");
@@ -190,7 +190,7 @@ absl::StatusOr<std::filesystem::path> RemoteRuns::Begin(const std::string& diges
 
 absl::Status RemoteRuns::Report(const std::string& digest, const std::string& token,
                                 const v1::Progress& progress) {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   *event.mutable_progress() = progress;
   const MutexLock lock(&mutex_);
   ASSIGN_OR_RETURN(const auto folder, FolderOf(digest, token));

@@ -11,9 +11,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/decomposition.pb.h"
-#include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model.pb.h"
 #include "carillon/v1/transfer.pb.h"
+#include "carillon/worker/v1/job_run_service.pb.h"
 #include "server/base/mutex.h"
 
 namespace carillon {
@@ -39,7 +39,7 @@ class RunUpload {
   /// Ends the run. When Finish returns, the result is on the disk and accepted, and the run's token
   /// is invalid. Finish must be the last call. Errors: those of Append and of RemoteRuns,
   /// InvalidArgument (TRANSFER_MALFORMED), DataLoss (TRANSFER_CORRUPT).
-  absl::Status Finish(const v1::RunEnd& end);
+  absl::Status Finish(const worker::v1::RunEnd& end);
 
  private:
   friend class RemoteRuns;

@@ -103,10 +103,11 @@ Ticket ReadTicket(const std::filesystem::path& folder) {
 }
 
 // The events of a run; what follows after the last whole one is ignored.
-std::vector<v1::WorkerEvent> ReadEvents(const std::filesystem::path& file) {
-  std::vector<v1::WorkerEvent> events;
+std::vector<worker::v1::WorkerEvent> ReadEvents(const std::filesystem::path& file) {
+  std::vector<worker::v1::WorkerEvent> events;
   WorkerEventReader reader;
-  reader.Feed(ReadFile(file), [&](const v1::WorkerEvent& event) { events.push_back(event); })
+  reader
+      .Feed(ReadFile(file), [&](const worker::v1::WorkerEvent& event) { events.push_back(event); })
       .IgnoreError();
   return events;
 }
@@ -218,10 +219,10 @@ int SlurmTask::RunCount() const {
 
 void SlurmTask::ReadProgress() {
   std::error_code ignored;
-  std::vector<v1::WorkerEvent> events;
+  std::vector<worker::v1::WorkerEvent> events;
   for (const auto& entry : std::filesystem::directory_iterator(folder_, ignored)) {
     if (entry.path().filename().string().rfind("events.", 0) != 0) continue;
-    const std::vector<v1::WorkerEvent> run = ReadEvents(entry.path());
+    const std::vector<worker::v1::WorkerEvent> run = ReadEvents(entry.path());
     if (run.size() > events.size()) events = run;
   }
   if (events.empty() || !events.back().has_progress()) return;
@@ -239,7 +240,8 @@ std::optional<Outcome> SlurmTask::TakeEnd() const {
   std::string run;
   int status = 0;
   if (!(end >> run >> status)) return std::nullopt;
-  const std::vector<v1::WorkerEvent> events = ReadEvents(folder_ / absl::StrCat("events.", run));
+  const std::vector<worker::v1::WorkerEvent> events =
+      ReadEvents(folder_ / absl::StrCat("events.", run));
   const auto reported =
       std::ranges::find_if(events, [](const auto& event) { return event.has_error(); });
   if (status == 0 && reported == events.end()) {

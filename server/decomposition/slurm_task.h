@@ -7,7 +7,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "server/decomposition/executor.h"
 #include "server/decomposition/remote_runs.h"
 #include "server/decomposition/slurm_options.h"
@@ -18,7 +18,8 @@ namespace carillon {
 /// The files of one decomposition, in a folder that the cluster shares or that RemoteRuns fills:
 ///
 ///     ticket     the name of this submission, and the hash of its token if it has one
-///     request    v1::WorkerRequest as text; if it differs from the current request, the folder is
+///     request    worker::v1::WorkerRequest as text; if it differs from the current request, the
+///     folder is
 ///                made anew
 ///     mesh
 ///     begun.R    a run R has begun        events.R   what it reported

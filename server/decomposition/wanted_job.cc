@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_request.h"
@@ -11,8 +12,6 @@
 
 namespace carillon {
 namespace {
-
-constexpr size_t kMaxLabelBytes = 200;
 
 WantedJob Name(const std::string& model, v1::CreateModalModelRequest use) {
   const std::string text =

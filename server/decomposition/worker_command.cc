@@ -12,7 +12,7 @@ namespace carillon {
 
 std::string WorkerRequestFile(const DecompositionTask& task) {
   const v1::CreateModalModelRequest& resolved = task.request;
-  v1::WorkerRequest request;
+  worker::v1::WorkerRequest request;
   if (task.radiates) {
     request.set_radiate_stored_model(true);
     *request.mutable_transfer() = resolved.transfer();

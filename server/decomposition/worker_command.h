@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "server/decomposition/executor.h"
 
 namespace carillon {
@@ -25,7 +26,7 @@ struct WorkerPlace {
 constexpr uint32_t kWayCount = 3;
 
 /// Returns the request to carillon-precompute for a task and its way (below kWayCount), as a
-/// v1::WorkerRequest in protobuf's text form.
+/// worker::v1::WorkerRequest in protobuf's text form.
 std::string WorkerRequestFile(const DecompositionTask& task);
 
 /// Writes WorkerRequestFile to `file`. Errors: FailedPrecondition (WORK_FOLDER_UNUSABLE).

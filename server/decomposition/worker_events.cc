@@ -22,8 +22,8 @@ absl::Status Garbage() {
 
 }  // namespace
 
-absl::Status WorkerEventReader::Feed(std::string_view bytes,
-                                     absl::FunctionRef<void(const v1::WorkerEvent&)> on_event) {
+absl::Status WorkerEventReader::Feed(
+    std::string_view bytes, absl::FunctionRef<void(const worker::v1::WorkerEvent&)> on_event) {
   pending_.append(bytes);
   size_t begin = 0;
   while (begin < pending_.size()) {
@@ -38,9 +38,9 @@ absl::Status WorkerEventReader::Feed(std::string_view bytes,
     if (size > kMaxEventBytes) return Garbage();
     const size_t body = begin + static_cast<size_t>(in.CurrentPosition());
     if (pending_.size() - body < size) break;
-    v1::WorkerEvent event;
+    worker::v1::WorkerEvent event;
     if (!event.ParseFromArray(pending_.data() + body, static_cast<int>(size)) ||
-        event.event_case() == v1::WorkerEvent::EVENT_NOT_SET) {
+        event.event_case() == worker::v1::WorkerEvent::EVENT_NOT_SET) {
       return Garbage();
     }
     on_event(event);
@@ -50,7 +50,7 @@ absl::Status WorkerEventReader::Feed(std::string_view bytes,
   return absl::OkStatus();
 }
 
-std::string Delimited(const v1::WorkerEvent& event) {
+std::string Delimited(const worker::v1::WorkerEvent& event) {
   std::ostringstream out;
   google::protobuf::util::SerializeDelimitedToOstream(event, &out);
   return out.str();

@@ -7,7 +7,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
-#include "carillon/v1/decomposition.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 
 namespace carillon {
 
@@ -20,13 +20,13 @@ class WorkerEventReader {
   /// Calls `on_event` for each event that `bytes` completes.
   /// Errors: DataLoss (WORKER_GARBAGE). The reader cannot be used after an error.
   absl::Status Feed(std::string_view bytes,
-                    absl::FunctionRef<void(const v1::WorkerEvent&)> on_event);
+                    absl::FunctionRef<void(const worker::v1::WorkerEvent&)> on_event);
 
  private:
   std::string pending_;
 };
 
 /// Returns the bytes of an event on the pipe.
-std::string Delimited(const v1::WorkerEvent& event);
+std::string Delimited(const worker::v1::WorkerEvent& event);
 
 }  // namespace carillon

@@ -12,9 +12,6 @@
 
 namespace carillon {
 
-/// Greatest length of a label. A longer label is cut.
-inline constexpr size_t kMaxLabelBytes = 200;
-
 /// Greatest number of tags of a model. A model to which an older version of Carillon gave more tags
 /// is returned with the first kMaxTagCount of them.
 inline constexpr size_t kMaxTagCount = 100;

@@ -9,6 +9,7 @@
 #include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/xxh3.h"
 #include "server/mode_database/codec/model_checker.h"

@@ -8,6 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/codec/model_codec.h"

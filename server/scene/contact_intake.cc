@@ -10,9 +10,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
-#include "proto/cpp/step_time.h"
 #include "server/scene/felt_contact.h"
 #include "server/scene/scene_frame.h"
 #include "server/synthesis/bank/acceleration_noise.h"

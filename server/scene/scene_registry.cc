@@ -206,7 +206,7 @@ absl::StatusOr<PlacedObject> SceneRegistry::AddObject(uint64_t scene, uint32_t h
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::AddObjects(
     uint64_t scene, const std::vector<NewObject>& objects, absl::FunctionRef<bool()> goes_on) {
-  return Add(scene, objects, InList, goes_on);
+  return Add(scene, objects, objects.size() > 1 ? InList : Alone, goes_on);
 }
 
 absl::StatusOr<std::vector<PlacedObject>> SceneRegistry::Add(uint64_t scene,

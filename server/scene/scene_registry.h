@@ -106,8 +106,8 @@ class SceneRegistry {
 
   /// Makes either all of the objects or none of them. An object without a handle gets one that no
   /// other of `objects` asks for. Nothing is added once `goes_on`, which is asked before each
-  /// object is made, returns false. Errors: those of AddObject, by AtElement ("objects"), and
-  /// Cancelled.
+  /// object is made, returns false. Errors: those of AddObject, by AtElement ("objects") if there
+  /// are several, and Cancelled.
   absl::StatusOr<std::vector<PlacedObject>> AddObjects(
       uint64_t scene, const std::vector<NewObject>& objects,
       absl::FunctionRef<bool()> goes_on = [] { return true; });

@@ -158,13 +158,14 @@ class FuzzedDaemon {
     wanted.set_id("fuzz");
     v1::CreateSceneResponse scene;
     Call(&v1::SceneService::Stub::CreateScene, wanted, scene);
-    v1::AddObjectRequest object;
-    object.set_scene(scene.name());
+    v1::AddObjectsRequest objects;
+    objects.set_scene(scene.name());
+    v1::NewObject& object = *objects.add_objects();
     object.set_modal_model("modalModels/" + SmallModel()->digest);
     object.mutable_material()->set_preset("chime_aluminum");
     object.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio);
-    v1::AddObjectResponse added;
-    Call(&v1::SceneService::Stub::AddObject, object, added);
+    v1::AddObjectsResponse added;
+    Call(&v1::SceneService::Stub::AddObjects, objects, added);
   }
 
   template <typename Method, typename Request, typename Response>

@@ -14,10 +14,10 @@
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
 #include "carillon/v1/decomposition_service.pb.h"
-#include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
 #include "carillon/v1/server_service.pb.h"
+#include "carillon/worker/v1/job_run_service.pb.h"
 
 namespace carillon {
 namespace {
@@ -33,7 +33,7 @@ std::vector<std::string> FindMethods() {
   for (const Descriptor* const request :
        {v1::CollectGarbageRequest::descriptor(), v1::ListenRequest::descriptor(),
         v1::RecordContactsRequest::descriptor(), v1::GetJobRequest::descriptor(),
-        v1::FetchMeshRequest::descriptor(), v1::UploadMeshRequest::descriptor(),
+        worker::v1::FetchMeshRequest::descriptor(), v1::UploadMeshRequest::descriptor(),
         v1::CreateSceneRequest::descriptor(), v1::GetServerInfoRequest::descriptor()}) {
     const ServiceDescriptor& service = *request->file()->service(0);
     for (int i = 0; i < service.method_count(); ++i) {

@@ -12,7 +12,7 @@
 
 namespace carillon {
 
-/// A call: its method as "carillon.v1.SceneService/AddObject", and its requests as they are sent.
+/// A call: its method as "carillon.v1.SceneService/AddObjects", and its requests as they are sent.
 struct RequestCase {
   std::string method;
   std::vector<std::string> messages;

@@ -30,9 +30,8 @@ void Write(const std::filesystem::path& folder, const std::string& method,
   WriteBytes(folder / method, ToText(input));
 }
 
-v1::AddObjectRequest SmallObject() {
-  v1::AddObjectRequest object;
-  object.set_scene(kScene);
+v1::NewObject SmallObject() {
+  v1::NewObject object;
   object.set_modal_model("modalModels/" + SmallModel()->digest);
   object.mutable_material()->set_preset("chime_aluminum");
   object.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio);
@@ -45,7 +44,7 @@ std::vector<v1::StreamContactsRequest> Contacts(const std::vector<v1::RenderRequ
   requests[0].mutable_start()->set_step_s(0.01);
   for (const v1::RenderRequest& request : rendering) {
     if (!request.record().has_step()) continue;
-    *requests.emplace_back().mutable_step() = request.record().step();
+    *requests.emplace_back().add_steps() = request.record().step();
   }
   return requests;
 }
@@ -85,7 +84,6 @@ void WriteRequestSeeds(const std::filesystem::path& folder,
   v1::CreateSceneRequest scene;
   scene.set_id("other");
   scene.mutable_hearing()->set_reference_distance_m(1);
-  Write<v1::AddObjectRequest>(folder, "AddObject", {SmallObject()});
   Write<v1::AddObjectsRequest>(folder, "AddObjects", {objects});
   Write<v1::UpdateObjectRequest>(folder, "UpdateObject", {moved});
   Write<v1::CreateSceneRequest>(folder, "CreateScene", {scene});

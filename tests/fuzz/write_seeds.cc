@@ -94,15 +94,19 @@ std::vector<v1::RenderRequest> Rendering() {
   object.mutable_material()->set_preset("chime_aluminum");
   object.mutable_material()->set_poisson_ratio(0.33);  // that of the model
   v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
-  v1::Impulse& impulse = *step.add_impulses();
+  v1::Contact& impulse = *step.add_contacts();
+  impulse.set_kind(v1::CONTACT_KIND_IMPACT);
   impulse.set_object(1);
   impulse.mutable_point_m();
   impulse.mutable_impulse_newton_seconds()->set_x(0.01);
   v1::ContactStep& later = *requests[4].mutable_record()->mutable_step();
   later.set_time_s(0.01);
-  later.mutable_columns()->add_object(1);
-  for (const float x : {0.F, 0.F, 0.F}) later.mutable_columns()->add_point_m(x);
-  for (const float x : {0.01F, 0.F, 0.F}) later.mutable_columns()->add_impulse_newton_seconds(x);
+  v1::ContactColumns& columns = *later.add_contact_columns();
+  columns.add_object(1);
+  for (const float x : {0.F, 0.F, 0.F}) columns.add_point_m(x);
+  for (const float x : {0.01F, 0.F, 0.F}) columns.add_impulse_newton_seconds(x);
+  later.mutable_poses()->add_object(1);
+  for (const double x : {0.0, 0.0, 1.0}) later.mutable_poses()->add_position_m(x);
   return requests;
 }
 

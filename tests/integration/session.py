@@ -47,31 +47,32 @@ class Contacts:
     def impulse(self):
         direction = [self.random.gauss(0, 1) for _ in range(3)]
         strength = 0.0006 * math.exp(self.random.gauss(0, 1))
-        return contact_pb2.Impulse(
-            object=self.random.randint(1, len(BODIES)), surface_point=self.place(),
+        return contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=self.random.randint(1, len(BODIES)),
+            surface_point=self.place(),
             impulse_newton_seconds=vector(*(strength * x for x in direction)),
             duration_s=self.random.choice((0, 1e-4, 5e-4, 2e-3)), time_offset_s=STEP_S * self.random.random())
 
     def drag(self, time_s):
         """Over a rough floor, and at times it rests."""
         speed = max(0.0, 0.2 * math.sin(time_s))
-        return contact_pb2.SustainedContact(
-            object=2, surface_point=contact_pb2.SurfacePoint(triangle=0, weight1=0.2, weight2=0.3),
+        return contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_FORCE, object=2,
+            surface_point=contact_pb2.SurfacePoint(triangle=0, weight1=0.2, weight2=0.3),
             force_newtons=vector(0.5 * speed, 0, 1), roughness=contact_pb2.Roughness(
                 travel_speed_m_per_s=speed, depth=0.5))
 
     def engine_contact(self, step):
         """A weight that jitters as engines' do, and falls anew every second."""
         newton_seconds = STEP_S * (1 + self.random.gauss(0, 0.02)) * (20 if step % 240 == 0 else 1)
-        return contact_pb2.EngineContact(
+        return contact_pb2.Contact(
             object=3, surface_point=contact_pb2.SurfacePoint(triangle=5, weight1=0.4, weight2=0.3),
             impulse_newton_seconds=vector(0, 0, newton_seconds), partner=7, duration_s=1e-3)
 
     def step(self, number):
         time_s = number * STEP_S
-        step = contact_pb2.ContactStep(time_s=time_s, sustained=[self.drag(time_s)],
-                                       contacts=[self.engine_contact(number)])
-        step.impulses.extend(self.impulse() for _ in range(self.random.choice((0, 0, 0, 1, 2))))
+        step = contact_pb2.ContactStep(time_s=time_s, contacts=[self.drag(time_s), self.engine_contact(number)])
+        step.contacts.extend(self.impulse() for _ in range(self.random.choice((0, 0, 0, 1, 2))))
         return step
 
 
@@ -186,9 +187,10 @@ class Session:
         """Plays live; (what JACK was given, what was counted, the last answer to the contacts)."""
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
         for item in self.objects:
-            self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-                scene=scene, modal_model=item.modal_model, material=item.material, size=item.size, gain=item.gain,
-                handle=item.handle))
+            self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+                scene=scene,
+                objects=[scene_service_pb2.NewObject(modal_model=item.modal_model, material=item.material,
+                    size=item.size, gain=item.gain, handle=item.handle)]))
         recording = self.folder / "capture.float32"
         recorder = subprocess.Popen(
             [jack.PROGRAMS / "record_jack", jack.PORT, str(seconds + 60), recording], env=self.jack.environment,
@@ -218,7 +220,7 @@ class Session:
         for number in range(int(seconds / STEP_S)):
             time.sleep(max(0.0, begin_s + number * STEP_S - time.monotonic()))
             self.steps.append(contacts.step(number))
-            yield request(step=self.steps[-1])
+            yield request(steps=[self.steps[-1]])
 
     def render(self, answer):
         """The trace of what was played, rendered offline."""

@@ -16,8 +16,9 @@ Partial = namedtuple("Partial", "frequency_hz decay_per_s amplitude")
 
 
 def impulse(point, force, handle=1, duration_s=0.0):
-    return contact_pb2.Impulse(
-        object=handle, point_m=contact_pb2.Vec3(x=point[0], y=point[1], z=point[2]),
+    return contact_pb2.Contact(
+        kind=contact_pb2.CONTACT_KIND_IMPACT, object=handle,
+        point_m=contact_pb2.Vec3(x=point[0], y=point[1], z=point[2]),
         impulse_newton_seconds=contact_pb2.Vec3(x=force[0], y=force[1], z=force[2]),
         duration_s=duration_s)
 

@@ -59,18 +59,22 @@ void SleepUntil(double time_s) {
 
 absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const std::string& scene,
                                              const std::string& model) {
-  v1::AddObjectRequest request;
+  v1::AddObjectsRequest request;
   request.set_scene(scene);
-  request.set_modal_model(model);
-  request.mutable_material()->set_preset("chime_aluminum");
-  request.mutable_material()->set_alpha2_per_s(kAlpha2PerS);
-  return daemon.AddObject(request);
+  v1::NewObject& object = *request.add_objects();
+  object.set_modal_model(model);
+  object.mutable_material()->set_preset("chime_aluminum");
+  object.mutable_material()->set_alpha2_per_s(kAlpha2PerS);
+  const auto added = daemon.AddObjects(request);
+  if (!added.ok()) return added.status();
+  return added->front();
 }
 
 v1::ContactStep MakeStep(double time_s, uint32_t object) {
   v1::ContactStep step;
   step.set_time_s(time_s);
-  v1::Impulse& impulse = *step.add_impulses();
+  v1::Contact& impulse = *step.add_contacts();
+  impulse.set_kind(v1::CONTACT_KIND_IMPACT);
   impulse.set_object(object);
   impulse.mutable_surface_point()->set_weight1(0.3);
   impulse.mutable_surface_point()->set_weight2(0.2);
@@ -247,9 +251,10 @@ void Print(const Arguments& arguments, const std::vector<Stream>& streams,
 absl::Status Measure(const Arguments& arguments) {
   const std::unique_ptr<client::Client> connection = client::Connect(arguments.server);
   const client::Client& daemon = *connection;
-  const auto scene = daemon.CreateScene({});
-  if (!scene.ok()) return scene.status();
-  const auto object = AddObject(daemon, *scene, arguments.model);
+  const auto created = daemon.CreateScene();
+  if (!created.ok()) return created.status();
+  const std::string& scene = created->name();
+  const auto object = AddObject(daemon, scene, arguments.model);
   if (!object.ok()) return object.status();
   const double longest_s =
       arguments.stream_count * (2 + kLongestGapS * (arguments.strike_count + 1)) + 1;
@@ -260,7 +265,7 @@ absl::Status Measure(const Arguments& arguments) {
   std::mt19937 random(1);
   std::vector<Stream> streams;
   for (int i = 0; i < arguments.stream_count; ++i) {
-    auto stream = Strike(daemon, *scene, object->handle(), arguments, random);
+    auto stream = Strike(daemon, scene, object->handle(), arguments, random);
     if (!stream.ok()) return stream.status();
     streams.push_back(*std::move(stream));
   }
@@ -268,7 +273,7 @@ absl::Status Measure(const Arguments& arguments) {
   const auto mixer = daemon.GetMixer();
   if (!mixer.ok()) return mixer.status();
   Print(arguments, streams, **capture, *before, *mixer);
-  return daemon.DeleteScene(*scene);
+  return daemon.DeleteScene(scene);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ from carillon.v1 import hearing_pb2
 from daemon import Daemon, DaemonTest
 
 HEARING = hearing_pb2.Hearing(binaural=True)
-STRIKE = carillon.Impulses(objects=[1], points=[(0, 0.008, 0.01)], impulses=[(0, 0, -0.002)], durations=[1e-4])
+STRIKE = carillon.Impacts(objects=[1], points=[(0, 0.008, 0.01)], impulses=[(0, 0, -0.002)], durations=[1e-4])
 
 
 def levels_db(sound):
@@ -31,7 +31,7 @@ class BinauralTest(DaemonTest):
     def heard_from(self, place, hearing=HEARING, **settings):
         trace = carillon.Trace(1 / 240, hearing=hearing)
         trace.add(self.model, pose=(place, (1, 0, 0, 0)))
-        trace.step(0.1, impulses=STRIKE)
+        trace.step(0.1, impacts=STRIKE)
         return self.client.render(trace, channel_count=2, tail_s=0.5, **settings)
 
     def test_each_ear_hears_its_own_side_louder(self):

@@ -44,8 +44,8 @@ class CoarseFirstTest(unittest.TestCase):
 
     def assert_sounds(self, name):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        handle = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=name, material=MATERIAL)).object.handle
+        handle = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene, objects=[scene_service_pb2.NewObject(modal_model=name, material=MATERIAL)])).objects[0].handle
         heard = self.client.listen(0.5, lambda: self.client.strike(
             scene, [sound.impulse((0, 0, 0), (0, 1, 0), handle=handle)]))
         self.assertGreater(numpy.abs(heard.samples).max(), 0)

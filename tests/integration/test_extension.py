@@ -40,8 +40,8 @@ class ExtensionTest(unittest.TestCase):
             modal_model_service_pb2.GetModalModelRequest(name=name)).modal_model
 
     def add(self, model):
-        return self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=self.scene, modal_model=model, material=MATERIAL)).object
+        return self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=self.scene, objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0]
 
     def assert_sounds(self, handle):
         """A strike of the object is taken, and something is heard."""

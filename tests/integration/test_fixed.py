@@ -77,7 +77,7 @@ class FixedTest(DaemonTest):
             body = contact_trace_pb2.ContactTraceObject(
                 handle=1, modal_model=model, material=material_pb2.Material(preset=meshes.MATERIAL))
             blow = contact_pb2.ContactStep(
-                time_s=0, impulses=[sound.impulse((x, WIDTH / 2, HEIGHT), (0, 0, -0.01))])
+                time_s=0, contacts=[sound.impulse((x, WIDTH / 2, HEIGHT), (0, 0, -0.01))])
             samples, _ = sound.render(self.daemon, [body], [blow], 0.5)
             return abs(samples).max()
 

@@ -60,12 +60,13 @@ class Scene(threading.Thread):
         super().__init__()
         self.client, self.stopped = client, threading.Event()
         self.scene = client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        self.handle = client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=self.scene, modal_model=model, material=MATERIAL)).object.handle
+        self.handle = client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=self.scene,
+            objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0].handle
 
     def run(self):
-        impulse = contact_pb2.Impulse(
-            object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+        impulse = contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
             impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
         while not self.stopped.wait(0.2):
             self.client.strike(self.scene, [impulse])

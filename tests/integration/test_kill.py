@@ -19,10 +19,10 @@ class KillTest(DaemonTest):
 
     def peak_of_a_strike(self, model):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        handle = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=model, material=MATERIAL)).object.handle
-        impulse = contact_pb2.Impulse(
-            object=handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+        handle = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene, objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0].handle
+        impulse = contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
             impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
         heard = self.client.listen(0.5, on_start=lambda: self.client.strike(scene, [impulse]))
         return max(map(abs, heard.samples))

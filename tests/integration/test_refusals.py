@@ -49,15 +49,16 @@ class RefusalTest(DaemonTest):
         super().setUpClass()
         model = cls.client.wait(cls.client.create(meshes.bar(), "obj", material=MATERIAL))
         cls.scene = cls.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        cls.handle = cls.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=cls.scene, modal_model=model, material=MATERIAL)).object.handle
+        cls.handle = cls.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=cls.scene,
+            objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0].handle
 
     def setUp(self):
         self.addCleanup(self.assert_plays)
 
     def assert_plays(self):
-        impulse = contact_pb2.Impulse(
-            object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+        impulse = contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
             impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
         heard = self.client.listen(0.2, on_start=lambda: self.client.strike(self.scene, [impulse]))
         self.assertGreater(max(map(abs, heard.samples)), 1e-5)
@@ -142,16 +143,15 @@ class RefusalTest(DaemonTest):
     def test_other_requests_say_what_is_wrong(self):
         absent = "modalModels/" + 64 * "0"
         cases = {
-            "MODAL_MODEL_NOT_FOUND": lambda: self.client.scenes.AddObject(
-                scene_service_pb2.AddObjectRequest(scene=self.scene, modal_model=absent,
-                                                   material=MATERIAL)),
+            "MODAL_MODEL_NOT_FOUND": lambda: self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+                scene=self.scene, objects=[scene_service_pb2.NewObject(modal_model=absent, material=MATERIAL)])),
             "SCENE_NOT_FOUND": lambda: self.client.strike("scenes/none", []),
             "UNKNOWN_MATERIAL": lambda: self.client.create(
                 meshes.bar(), "obj", material=material_pb2.Material(preset="cheese")),
             "MESH_FORMAT_UNKNOWN": lambda: self.client.create(meshes.bar(), "fbx",
                                                               material=MATERIAL),
-            "OBJECT_NOT_FOUND": lambda: self.client.strike(self.scene, [contact_pb2.Impulse(
-                object=77, point_m=contact_pb2.Vec3(),
+            "OBJECT_NOT_FOUND": lambda: self.client.strike(self.scene, [contact_pb2.Contact(
+                kind=contact_pb2.CONTACT_KIND_IMPACT, object=77, point_m=contact_pb2.Vec3(),
                 impulse_newton_seconds=contact_pb2.Vec3(x=1))]),
             "TRACE_MALFORMED": lambda: list(self.client.audio.Render(iter([
                 audio_service_pb2.RenderRequest(record={"object": {"handle": 1}})]))),

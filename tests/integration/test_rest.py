@@ -69,13 +69,13 @@ class RestTest(DaemonTest):
 
     def constant_load(self, rate_hz):
         """A blow, and then the weight of 2 kg from two seconds on."""
-        steps = [contact_pb2.ContactStep(time_s=0, impulses=[
+        steps = [contact_pb2.ContactStep(time_s=0, contacts=[
             sound.impulse((0.03, 0.02, -0.015), (0, 0, 2), duration_s=0.0005)])]
         place = contact_pb2.Vec3(x=0.03, y=0.02, z=-0.015)
         for step in range(2 * rate_hz, 5 * rate_hz):
-            force = contact_pb2.SustainedContact(object=1, point_m=place,
-                                                 force_newtons=contact_pb2.Vec3(z=19.62))
-            steps.append(contact_pb2.ContactStep(time_s=step / rate_hz, sustained=[force]))
+            force = contact_pb2.Contact(kind=contact_pb2.CONTACT_KIND_FORCE, object=1, point_m=place,
+                                        force_newtons=contact_pb2.Vec3(z=19.62))
+            steps.append(contact_pb2.ContactStep(time_s=step / rate_hz, contacts=[force]))
         trace = self.folder / "load.contacts"
         body = contact_trace_pb2.ContactTraceObject(
             handle=1, modal_model=self.model, material=material_pb2.Material(preset=MATERIAL))

@@ -15,7 +15,7 @@ from daemon import DaemonTest
 
 
 def at_once(*impulses):
-    return [contact_pb2.ContactStep(time_s=0, impulses=impulses)]
+    return [contact_pb2.ContactStep(time_s=0, contacts=impulses)]
 
 
 class StruckBody(DaemonTest):
@@ -144,20 +144,21 @@ class BarTest(StruckBody):
         numpy.testing.assert_array_equal(self.struck(), self.struck())
 
     def test_live_sounds_as_offline(self):
-        steps = [contact_pb2.ContactStep(time_s=time, impulses=[sound.impulse(self.POINT, force)])
+        steps = [contact_pb2.ContactStep(time_s=time, contacts=[sound.impulse(self.POINT, force)])
                  for time, force in ((0.0, self.IMPULSE), (0.13, (0.0, -0.0003, -0.0002)))]
         offline = self.render(self.object(), steps, 0.4)
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=self.model, handle=1,
-            material=material_pb2.Material(preset=meshes.MATERIAL)))
+        self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene,
+            objects=[scene_service_pb2.NewObject(modal_model=self.model, handle=1,
+                material=material_pb2.Material(preset=meshes.MATERIAL))]))
         request = contact_service_pb2.StreamContactsRequest
         start = contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.01,
                                                        scheduling_delay_s=0.2)
         answers = []
         heard = self.client.listen(2.0, on_start=lambda: answers.extend(
             self.client.contacts.StreamContacts(
-                iter([request(start=start)] + [request(step=step) for step in steps]))))
+                iter([request(start=start)] + [request(steps=[step]) for step in steps]))))
         self.client.scenes.DeleteScene(scene_service_pb2.DeleteSceneRequest(name=scene))
         self.assertEqual((answers[-1].accepted_count, answers[-1].late_count), (2, 0))
         self.assertEqual((heard.sample_rate_hz, heard.lost_frame_count), (sound.RATE, 0))

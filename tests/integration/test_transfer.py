@@ -96,8 +96,8 @@ class TransferTest(unittest.TestCase):
     def add_object(self, model):
         """The name of an object in a scene of its own, and how it radiates."""
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        added = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=model, material=MATERIAL)).object
+        added = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene, objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0]
         return added.name, added.radiation
 
     def render(self, model, radiation, gain=1, **header_fields):
@@ -105,7 +105,7 @@ class TransferTest(unittest.TestCase):
         length, width, height = meshes.BAR_SIZE
         placed = contact_trace_pb2.ContactTraceObject(
             handle=1, modal_model=model, material=MATERIAL, radiation=radiation, gain=gain)
-        step = contact_pb2.ContactStep(time_s=0, impulses=[
+        step = contact_pb2.ContactStep(time_s=0, contacts=[
             sound.impulse((length, width, height), (0, 0.3e-3, -1e-3))])
         samples, _ = sound.render(self.daemon, [placed], [step], 0.5, **header_fields)
         return samples

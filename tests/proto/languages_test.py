@@ -68,7 +68,7 @@ class LanguagesTest(unittest.TestCase):
         made = self.out / "classes"
         run("javac", "-nowarn", "-proc:none", "-d", made, "-cp", path, *self.out.rglob("*.java"))
         # Each message is a class of its own.
-        for name in ("ContactServiceGrpc", "EngineContactColumns", "ContactProto"):
+        for name in ("ContactServiceGrpc", "ContactColumns", "ContactProto"):
             self.assertTrue((made / f"audio/carillon/v1/{name}.class").is_file(), name)
 
     def test_c_sharp(self):

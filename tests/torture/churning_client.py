@@ -47,25 +47,26 @@ class Churning:
         self.client = strike.Client(self.server)
         dies = self.random.random() < DEATHS
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        handle = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=self.model, material=MATERIAL)).object.handle
+        handle = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene,
+            objects=[scene_service_pb2.NewObject(modal_model=self.model, material=MATERIAL)])).objects[0].handle
         act = self.random.choice((self.listen, self.render, self.list, self.submit, self.listen))
         for _ in self.client.contacts.StreamContacts(self.steps(scene, handle, dies, act)):
             pass
         self.client.scenes.DeleteScene(scene_service_pb2.DeleteSceneRequest(name=scene))
 
     def step(self, number, handle):
-        impulse = contact_pb2.Impulse(
-            object=handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+        impulse = contact_pb2.Contact(
+            kind=contact_pb2.CONTACT_KIND_IMPACT, object=handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
             impulse_newton_seconds=contact_pb2.Vec3(z=-self.random.uniform(1e-4, 1e-3)))
-        return contact_pb2.ContactStep(time_s=number * STEP_S, impulses=[impulse])
+        return contact_pb2.ContactStep(time_s=number * STEP_S, contacts=[impulse])
 
     def steps(self, scene, handle, dies, act):
         request = contact_service_pb2.StreamContactsRequest
         yield request(start=contact_service_pb2.ContactStreamStart(scene=scene, step_s=STEP_S))
         last = self.random.randrange(STEPS)
         for number in range(STEPS):
-            yield request(step=self.step(number, handle))
+            yield request(steps=[self.step(number, handle)])
             if number == last:
                 with telling():
                     act(dies)

@@ -54,8 +54,10 @@ class CrowdClient {
 
   void Strike(double time_s) {
     StreamContactsRequest request;
-    request.mutable_step()->set_time_s(time_s);
-    carillon::v1::Impulse& impulse = *request.mutable_step()->add_impulses();
+    carillon::v1::ContactStep& step = *request.add_steps();
+    step.set_time_s(time_s);
+    carillon::v1::Contact& impulse = *step.add_contacts();
+    impulse.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
     impulse.set_object(handle_);
     impulse.mutable_point_m()->set_z(0.01F);
     impulse.mutable_impulse_newton_seconds()->set_z(-1e-5F);

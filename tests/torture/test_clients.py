@@ -238,12 +238,12 @@ class ClientTest(torture.ServedTest):
         self.assertGreater(float(during["carillon_connections"]), 0)
         self.assertGreater(float(during["carillon_database_bytes"]), 0)
         self.assertGreater(float(during['carillon_jobs_ended_total{state="succeeded"}']), 0)
-        bad = contact_pb2.Impulse(object=99, point_m=contact_pb2.Vec3(),
+        bad = contact_pb2.Contact(kind=contact_pb2.CONTACT_KIND_IMPACT, object=99, point_m=contact_pb2.Vec3(),
                                   impulse_newton_seconds=contact_pb2.Vec3(x=1))
         list(self.client.contacts.StreamContacts(iter([
             contact_service_pb2.StreamContactsRequest(
                 start=contact_service_pb2.ContactStreamStart(scene=scene.scene, step_s=0.01)),
-            contact_service_pb2.StreamContactsRequest(step=contact_pb2.ContactStep(impulses=[bad]))])))
+            contact_service_pb2.StreamContactsRequest(steps=[contact_pb2.ContactStep(contacts=[bad])])])))
         self.assertEqual(read()['carillon_impulses_rejected_total{reason="OBJECT_NOT_FOUND"}'], "1")
 
     def test_metrics_are_read_within_prometheus_s_limit_beside_400_connections_that_say_nothing(self):

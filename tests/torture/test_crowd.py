@@ -93,9 +93,11 @@ class CrowdTest(torture.ServedTest):
 
     def scene_with(self, model):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        added = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=model, material=material_pb2.Material(preset=meshes.MATERIAL), gain=0.01))
-        return scene, str(added.object.handle)
+        added = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene,
+            objects=[scene_service_pb2.NewObject(modal_model=model,
+                material=material_pb2.Material(preset=meshes.MATERIAL), gain=0.01)]))
+        return scene, str(added.objects[0].handle)
 
     def start_crowd(self, clients, seconds, targets):
         """The process, once all its streams are open."""

@@ -131,11 +131,11 @@ class DamagedModelTest(torture.ServedTest):
                    record(object=contact_trace_pb2.ContactTraceObject(handle=1, modal_model=model, material=MATERIAL))]
         for number in range(3):
             step = contact_pb2.ContactStep(time_s=0.01 * number)
-            step.impulses.add(object=1, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]), duration_s=0.001,
+            step.contacts.add(kind=contact_pb2.CONTACT_KIND_IMPACT, object=1, duration_s=0.001,
+                              point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
                               impulse_newton_seconds=contact_pb2.Vec3(z=-1e-3))
-            step.columns.object.append(1)
-            step.columns.point_m.extend((0.01, 0.01, meshes.BAR_SIZE[2]))
-            step.columns.impulse_newton_seconds.extend((0, 0, -1e-3))
+            step.contact_columns.add(kind=contact_pb2.CONTACT_KIND_IMPACT, object=[1],
+                                     point_m=(0.01, 0.01, meshes.BAR_SIZE[2]), impulse_newton_seconds=(0, 0, -1e-3))
             records.append(record(step=step))
         request = audio_service_pb2.RenderRequest
         return [request(settings=audio_service_pb2.RenderSettings(tail_s=0.05)),

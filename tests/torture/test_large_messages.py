@@ -95,15 +95,14 @@ class LargeMessageTest(torture.ServedTest):
         request = contact_service_pb2.StreamContactsRequest
         self.attack("/carillon.v1.ContactService/StreamContacts",
                     request(start=contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.01)),
-                    repeated(request(step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()]))))
+                    repeated(request(steps=[contact_pb2.ContactStep(contacts=[contact_pb2.Contact()])])))
 
     def test_short_messages_of_many_steps(self):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
         request = contact_service_pb2.StreamContactsRequest
-        steps = contact_service_pb2.ContactSteps(steps=[contact_pb2.ContactStep()])
         self.attack("/carillon.v1.ContactService/StreamContacts",
                     request(start=contact_service_pb2.ContactStreamStart(scene=scene, step_s=0.01)),
-                    repeated(request(steps=steps), byte_count=1000))
+                    repeated(request(steps=[contact_pb2.ContactStep()]), byte_count=1000))
 
     def test_renderings(self):
         record = contact_trace_pb2.ContactTraceRecord
@@ -111,7 +110,7 @@ class LargeMessageTest(torture.ServedTest):
         self.attack("/carillon.v1.AudioService/Render",
                     request(settings=audio_service_pb2.RenderSettings()),
                     repeated(request(record=record(
-                        step=contact_pb2.ContactStep(impulses=[contact_pb2.Impulse()])))))
+                        step=contact_pb2.ContactStep(contacts=[contact_pb2.Contact()])))))
 
 
 if __name__ == "__main__":

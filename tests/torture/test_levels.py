@@ -38,7 +38,7 @@ class LevelTest(DaemonTest):
         times = {round(i * PERIOD_S, 3): [] for i in range(int(SECONDS / PERIOD_S))}
         for time_s, newton_seconds in blows:
             times[time_s].append(sound.impulse(tip, (0, 0, -newton_seconds), handle=2, duration_s=1e-4))
-        steps = [contact_pb2.ContactStep(time_s=time_s, impulses=[sound.impulse(tip, (0, 0, -1e-4)), *rogues])
+        steps = [contact_pb2.ContactStep(time_s=time_s, contacts=[sound.impulse(tip, (0, 0, -1e-4)), *rogues])
                  for time_s, rogues in sorted(times.items())]
         samples, summary = sound.render(self.daemon, objects, steps, 0)
         self.assertEqual(int(summary.get("rejectedCount", 0)), 0, summary)

@@ -77,9 +77,10 @@ class SoundingScene:
         self.model = self.client.wait(self.client.create(
             meshes.bar(), "obj", material=material_pb2.Material(preset=meshes.MATERIAL)))
         self.scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        self.handle = self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=self.scene, modal_model=self.model,
-            material=material_pb2.Material(preset=meshes.MATERIAL))).object.handle
+        self.handle = self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=self.scene,
+            objects=[scene_service_pb2.NewObject(modal_model=self.model,
+                material=material_pb2.Material(preset=meshes.MATERIAL))])).objects[0].handle
         self.stopped = threading.Event()
         self.answer = contact_service_pb2.StreamContactsResponse()
         self.heard = audio_service_pb2.ListenResponse()
@@ -94,10 +95,11 @@ class SoundingScene:
         begin_s = time.monotonic()
         step = 0
         while not self.stopped.wait(max(0.0, begin_s + step * self.PERIOD_S - time.monotonic())):
-            impulse = contact_pb2.Impulse(
-                object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
+            impulse = contact_pb2.Contact(
+                kind=contact_pb2.CONTACT_KIND_IMPACT, object=self.handle,
+                point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
                 impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
-            yield request(step=contact_pb2.ContactStep(time_s=step * self.PERIOD_S, impulses=[impulse]))
+            yield request(steps=[contact_pb2.ContactStep(time_s=step * self.PERIOD_S, contacts=[impulse])])
             step += 1
 
     def _strike(self):

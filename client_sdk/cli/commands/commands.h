@@ -12,6 +12,10 @@
 #include "client_sdk/cli/commands/material_figures.h"
 #include "client_sdk/cli/commands/stop_signal.h"
 
+namespace carillon::client {
+class JobRunClient;
+}  // namespace carillon::client
+
 namespace carillon::cli {
 
 /// The options of `carillon model create`.
@@ -180,7 +184,7 @@ absl::Status WatchJobs(const client::Client& daemon, const v1::WatchJobsRequest&
 /// or the error. Calls that find no daemon are repeated for ten minutes. Errors: those of
 /// JobRunService, Internal (OUTPUT_NOT_WRITABLE: the folder cannot be made), Cancelled
 /// (RUN_STOPPED).
-absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
+absl::Status RunJob(const client::JobRunClient& run, const std::vector<std::string>& command,
                     const StopSignal& stop);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);

@@ -13,6 +13,7 @@
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/output/job_progress.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/near_names.h"
 #include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
@@ -156,8 +157,7 @@ std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummar
 }
 
 std::string OtherLabel(const v1::ModalModelSummary& model, const std::string& wanted) {
-  constexpr size_t kMostBytes = 200;  // the daemon cuts longer labels
-  if (model.label() == wanted || wanted.size() > kMostBytes) return "";
+  if (model.label() == wanted || wanted.size() > kMaxLabelBytes) return "";
   return absl::StrCat(
       "the model of this body is known as '", model.label(), "' and keeps this label, so that '",
       wanted,

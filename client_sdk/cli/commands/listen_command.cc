@@ -150,8 +150,8 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
   Recorder recorder(options, stop);
   v1::ListenRequest request;
   request.set_scene(SceneNamed(options.scene));
-  const absl::Status heard = daemon.ListenTo(
-      request, [&](const client::AudioBlock& block) { return recorder.Take(block); });
+  const absl::Status heard =
+      daemon.Listen(request, [&](const client::AudioBlock& block) { return recorder.Take(block); });
   recorder.Finish();
   if (recorder.lost_frame_count() > 0) {
     absl::FPrintF(stderr, "%s lost on the way\n", Counted(recorder.lost_frame_count(), "frame"));

@@ -26,10 +26,14 @@ struct Program {
   std::function<absl::Status()> command;
 
   std::unique_ptr<client::Client> Daemon() const {
-    return client::Connect(server, {.tls_roots_pem = ForTls(tls_roots_file),
-                                    .tls_certificate_pem = ForTls(tls_certificate_file),
-                                    .tls_key_pem = ForTls(tls_key_file),
-                                    .token = Token()});
+    return client::Connect(server, Connection());
+  }
+
+  client::ConnectOptions Connection() const {
+    return {.tls_roots_pem = ForTls(tls_roots_file),
+            .tls_certificate_pem = ForTls(tls_certificate_file),
+            .tls_key_pem = ForTls(tls_key_file),
+            .token = Token()};
   }
 
  private:

@@ -19,7 +19,9 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/job_runs/job_run_client.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/child_process.h"
 #include "proto/cpp/status_macros.h"
@@ -93,12 +95,12 @@ absl::Status Patiently(const StopSignal& stop, const std::function<absl::Status(
 
 /// Reads the events of the command until it closes the pipe: keeps its error, if any, and passes
 /// progress on. A command that goes on writing after something that is no event gets SIGPIPE.
-void FollowEvents(Pipe events, v1::RunEnd& end,
+void FollowEvents(Pipe events, worker::v1::RunEnd& end,
                   const std::function<void(const v1::Progress&)>& on_progress) {
   events.CloseWriteEnd();
   google::protobuf::io::FileInputStream in(events.read_end());
   auto reported = steady_clock::now() - kBetweenReports;
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   bool at_end = false;
   while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&event, &in, &at_end)) {
     if (event.has_error()) *end.mutable_error() = event.error();
@@ -121,8 +123,8 @@ std::string HostName() {
 }
 
 /// The end of a run whose command could not be started.
-v1::RunEnd NotStarted(const std::string& program) {
-  v1::RunEnd end;
+worker::v1::RunEnd NotStarted(const std::string& program) {
+  worker::v1::RunEnd end;
   end.set_exit_status(kNotFound);
   *end.mutable_error() =
       ToErrorInfo(Refusal(absl::StatusCode::kFailedPrecondition, "WORKER_NOT_FOUND",
@@ -131,9 +133,9 @@ v1::RunEnd NotStarted(const std::string& program) {
   return end;
 }
 
-absl::StatusOr<v1::RunEnd> RunToEnd(const std::vector<std::string>& command,
-                                    const RunFolder& folder, const StopSignal& stop,
-                                    const std::function<void(const v1::Progress&)>& on_progress) {
+absl::StatusOr<worker::v1::RunEnd> RunToEnd(
+    const std::vector<std::string>& command, const RunFolder& folder, const StopSignal& stop,
+    const std::function<void(const v1::Progress&)>& on_progress) {
   absl::StatusOr<Pipe> events = Pipe::Make();
   if (!events.ok()) return NotStarted(command.front());
   absl::StatusOr<ChildProcess> child = ChildProcess::Start({.words = command,
@@ -151,7 +153,7 @@ absl::StatusOr<v1::RunEnd> RunToEnd(const std::vector<std::string>& command,
       return;
     }
   });
-  v1::RunEnd end;
+  worker::v1::RunEnd end;
   FollowEvents(*std::move(events), end, on_progress);
   watch.request_stop();
   watch.join();
@@ -164,20 +166,18 @@ absl::StatusOr<v1::RunEnd> RunToEnd(const std::vector<std::string>& command,
 
 }  // namespace
 
-absl::Status RunJob(const client::Client& daemon, const RunJobOptions& options,
+absl::Status RunJob(const client::JobRunClient& run, const std::vector<std::string>& command,
                     const StopSignal& stop) {
   unsetenv("CARILLON_JOB_TOKEN");  // of no use to the command
-  const client::JobRun run{.job = absl::StrCat("jobs/", options.digest), .token = options.token};
   ASSIGN_OR_RETURN(const RunFolder folder, RunFolder::Make());
   RETURN_IF_ERROR(SaveStandardInput(folder.File("request")));
-  RETURN_IF_ERROR(Patiently(stop, [&] { return daemon.FetchMesh(run, folder.File("mesh")); }));
-  const absl::StatusOr<v1::RunEnd> end = RunToEnd(
-      options.command, folder, stop,
-      [&](const v1::Progress& progress) { daemon.ReportProgress(run, progress).IgnoreError(); });
+  RETURN_IF_ERROR(Patiently(stop, [&] { return run.FetchMesh(folder.File("mesh")); }));
+  const absl::StatusOr<worker::v1::RunEnd> end =
+      RunToEnd(command, folder, stop,
+               [&](const v1::Progress& progress) { run.ReportProgress(progress).IgnoreError(); });
   if (!end.ok()) return end.status();
   const bool done = end->exit_status() == 0 && !end->has_error();
-  return Patiently(
-      stop, [&] { return daemon.UploadResult(run, *end, done ? folder.File("model") : ""); });
+  return Patiently(stop, [&] { return run.UploadResult(*end, done ? folder.File("model") : ""); });
 }
 
 }  // namespace carillon::cli

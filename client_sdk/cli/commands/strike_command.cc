@@ -50,38 +50,41 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
                                              const StrikeOptions& options) {
   ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
   ASSIGN_OR_RETURN(const auto material, ToMaterial(options.material));
-  v1::AddObjectRequest request;
+  v1::AddObjectsRequest request;
   request.set_scene(scene);
-  request.set_modal_model(model);
-  if (material.ByteSizeLong() > 0) *request.mutable_material() = material;
-  request.set_size(options.size);
-  request.set_gain(options.gain);
-  if (options.paper_coupling) request.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
-  if (options.modes_only) request.set_radiation(v1::RADIATION_MODEL_MODES_ONLY);
-  return daemon.AddObject(request);
+  v1::NewObject& object = *request.add_objects();
+  object.set_modal_model(model);
+  if (material.ByteSizeLong() > 0) *object.mutable_material() = material;
+  object.set_size(options.size);
+  object.set_gain(options.gain);
+  if (options.paper_coupling) object.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
+  if (options.modes_only) object.set_radiation(v1::RADIATION_MODEL_MODES_ONLY);
+  ASSIGN_OR_RETURN(const auto added, daemon.AddObjects(request));
+  return added.front();
 }
 
-v1::Impulse ImpulseOf(const StrikeOptions& options, uint32_t handle) {
-  v1::Impulse impulse;
-  impulse.set_object(handle);
-  Set(*impulse.mutable_point_m(), options.point_m);
-  Set(*impulse.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
-  if (options.duration_s) impulse.set_duration_s(*options.duration_s);
-  impulse.mutable_hertz()->set_striker(options.striker);
-  return impulse;
+v1::Contact ImpactOf(const StrikeOptions& options, uint32_t handle) {
+  v1::Contact impact;
+  impact.set_kind(v1::CONTACT_KIND_IMPACT);
+  impact.set_object(handle);
+  Set(*impact.mutable_point_m(), options.point_m);
+  Set(*impact.mutable_impulse_newton_seconds(), options.impulse_newton_seconds);
+  if (options.duration_s) impact.set_duration_s(*options.duration_s);
+  impact.mutable_hertz()->set_striker(options.striker);
+  return impact;
 }
 
 /// Sends the strike so that it sounds on arrival. Returns the warnings about it.
-absl::StatusOr<std::vector<std::string>> SendImpulse(const client::Client& daemon,
-                                                     const std::string& scene, uint32_t handle,
-                                                     const StrikeOptions& options) {
+absl::StatusOr<std::vector<std::string>> SendImpact(const client::Client& daemon,
+                                                    const std::string& scene, uint32_t handle,
+                                                    const StrikeOptions& options) {
   v1::ContactStreamStart start;
   start.set_scene(scene);
   start.set_step_s(kStep);
   start.set_at_once(true);
   ASSIGN_OR_RETURN(const auto stream, daemon.StreamContacts(start));
   v1::ContactStep step;
-  *step.add_impulses() = ImpulseOf(options, handle);
+  *step.add_contacts() = ImpactOf(options, handle);
   RETURN_IF_ERROR(stream->Send(std::move(step)));
   ASSIGN_OR_RETURN(const auto report, stream->Finish());
   if (report.rejected_count() > 0) {
@@ -116,7 +119,7 @@ absl::Status WriteTrace(const v1::SoundingObject& object, const StrikeOptions& o
   body.set_radiation(object.radiation());
   writer.Write(body);
   v1::ContactStep step;
-  *step.add_impulses() = ImpulseOf(options, object.handle());
+  *step.add_contacts() = ImpactOf(options, object.handle());
   RETURN_IF_ERROR(writer.Write(step));
   return writer.Close();
 }
@@ -185,7 +188,7 @@ void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& obj
 absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
                       const StrikeOptions& options, const StopSignal& stop, bool json) {
   ASSIGN_OR_RETURN(const auto object, AddObject(daemon, scene, options));
-  ASSIGN_OR_RETURN(const auto warnings, SendImpulse(daemon, scene, object.handle(), options));
+  ASSIGN_OR_RETURN(const auto warnings, SendImpact(daemon, scene, object.handle(), options));
   for (const std::string& warning : warnings) absl::FPrintF(stderr, "warning: %s\n", warning);
   if (json) {
     PrintStrikeJson(daemon, object, options, warnings);
@@ -201,9 +204,9 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
 
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json) {
-  ASSIGN_OR_RETURN(const auto scene, daemon.CreateScene({}));
-  const absl::Status struck = StrikeIn(daemon, scene, options, stop, json);
-  const absl::Status deleted = daemon.DeleteScene(scene);
+  ASSIGN_OR_RETURN(const auto scene, daemon.CreateScene());
+  const absl::Status struck = StrikeIn(daemon, scene.name(), options, stop, json);
+  const absl::Status deleted = daemon.DeleteScene(scene.name());
   return struck.ok() ? deleted : struck;
 }
 

@@ -10,9 +10,11 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/options/sound_options.h"
 #include "client_sdk/cli/options/value_options.h"
+#include "client_sdk/job_runs/job_run_client.h"
 
 namespace carillon::cli {
 namespace {
@@ -32,7 +34,10 @@ void AddJobRun(CLI::App& job, Program& program) {
   run.callback([&program, options] {
     program.command = [&program, options] {
       const StopSignal stop;
-      return RunJob(*program.Daemon(), *options, stop);
+      const client::JobRunClient calls(
+          program.server, program.Connection(),
+          {.job = absl::StrCat("jobs/", options->digest), .token = options->token});
+      return RunJob(calls, options->command, stop);
     };
   });
 }

@@ -14,15 +14,13 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/output/output.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/program/escaped_text.h"
 
 namespace carillon::cli {
 namespace {
 
 constexpr int kBarWidth = 30;
-
-// The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
-constexpr double kLikelyExtentM = 20;
 
 absl::string_view PhaseName(v1::Phase phase) {
   switch (phase) {

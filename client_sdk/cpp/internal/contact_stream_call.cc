@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cpp/internal/contact_stream_call.h"
 
-#include <grpcpp/client_context.h>
 #include <grpcpp/support/client_callback.h>
 
 #include <algorithm>
@@ -12,17 +11,17 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
-#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "client_sdk/cpp/internal/step_time.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
 namespace {
 
-/// The daemon takes messages of 2 MiB (ServerLimits.message_bytes), with some bytes around a step.
-constexpr size_t kMostStepBytes = (size_t{2} << 20U) - 64;
+/// A message has some bytes around a step.
+constexpr size_t kMostStepBytes = kMaxMessageBytes - 64;
 /// Steps that wait are sent together up to this size and number. The cost of a message is then
 /// small beside that of its steps, and Send() waits only briefly while they are put together.
 constexpr size_t kMostBytesTogether = size_t{64} << 10U;
@@ -39,18 +38,17 @@ class ContactStreamCall final
     : public ContactStream,
       public grpc::ClientBidiReactor<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactStreamCall(std::string server, const std::string& token) : server_(std::move(server)) {
-    Authorize(context_, server_, token);
-  }
+  ContactStreamCall(std::string server, std::unique_ptr<grpc::ClientContext> context)
+      : server_(std::move(server)), context_(std::move(context)) {}
 
   ~ContactStreamCall() override {
-    context_.TryCancel();
+    context_->TryCancel();
     absl::MutexLock lock(&mutex_);
     if (started_) mutex_.Await(absl::Condition(this, &ContactStreamCall::Done));
   }
 
   absl::Status Open(v1::ContactService::Stub& stub, const v1::ContactStreamStart& start) {
-    stub.async()->StreamContacts(&context_, this);
+    stub.async()->StreamContacts(context_.get(), this);
     {
       absl::MutexLock lock(&mutex_);
       started_ = true;
@@ -186,13 +184,8 @@ class ContactStreamCall final
 
   void WriteNextLocked() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     written_step_count_ = CountTogetherLocked();
-    if (written_step_count_ == 1) {
-      *written_.mutable_step() = TakeStepLocked();
-    } else {
-      auto& steps = *written_.mutable_steps()->mutable_steps();
-      steps.Clear();
-      for (size_t i = 0; i < written_step_count_; ++i) *steps.Add() = TakeStepLocked();
-    }
+    written_.Clear();
+    for (size_t i = 0; i < written_step_count_; ++i) *written_.add_steps() = TakeStepLocked();
     writing_ = true;
     StartWrite(&written_);
   }
@@ -216,7 +209,7 @@ class ContactStreamCall final
   bool AnsweredOrDone() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return answered_ || Done(); }
 
   const std::string server_;
-  grpc::ClientContext context_;
+  const std::unique_ptr<grpc::ClientContext> context_;
   v1::StreamContactsResponse answer_;    ///< belongs to the read in progress
   v1::StreamContactsRequest written_{};  ///< belongs to the write in progress
   mutable absl::Mutex mutex_;
@@ -237,9 +230,9 @@ class ContactStreamCall final
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
-    v1::ContactService::Stub& stub, const std::string& server, const std::string& token,
-    const v1::ContactStreamStart& start) {
-  auto call = std::make_unique<ContactStreamCall>(server, token);
+    v1::ContactService::Stub& stub, const std::string& server,
+    std::unique_ptr<grpc::ClientContext> context, const v1::ContactStreamStart& start) {
+  auto call = std::make_unique<ContactStreamCall>(server, std::move(context));
   RETURN_IF_ERROR(call->Open(stub, start));
   return call;
 }

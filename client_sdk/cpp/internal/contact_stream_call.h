@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <grpcpp/client_context.h>
+
 #include <memory>
 #include <string>
 
@@ -10,10 +12,10 @@
 
 namespace carillon::client {
 
-/// Opens StreamContacts on `stub` with the client's token, and waits for the first answer. Error
-/// messages name `server`.
+/// Opens StreamContacts on `stub` with the token and the deadline of `context`, and waits for the
+/// first answer. Error messages name `server`.
 absl::StatusOr<std::unique_ptr<ContactStream>> OpenContactStream(
-    v1::ContactService::Stub& stub, const std::string& server, const std::string& token,
-    const v1::ContactStreamStart& start);
+    v1::ContactService::Stub& stub, const std::string& server,
+    std::unique_ptr<grpc::ClientContext> context, const v1::ContactStreamStart& start);
 
 }  // namespace carillon::client

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The calls that transfer models and files, and those of administrators.
+// The calls that transfer models and files.
 #include <grpcpp/client_context.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
-#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/grpc_client.h"
-#include "client_sdk/cpp/internal/model_file.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "client_sdk/cpp/internal/whole_file.h"
 #include "proto/cpp/status_macros.h"
@@ -17,7 +14,7 @@
 namespace carillon::client {
 absl::Status GrpcClient::ExportModalModel(const std::string& name, const RecordSink& sink) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   v1::ExportModalModelRequest request;
   request.set_name(name);
   request.set_transfers(true);
@@ -34,7 +31,7 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
     const std::function<absl::Status(const RecordSink&)>& send, const std::string& name,
     const std::string& label) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   v1::ImportModalModelResponse response;
   const auto writer = stubs_->models.ImportModalModel(&context, &response);
   v1::ImportModalModelRequest request;
@@ -56,19 +53,10 @@ absl::StatusOr<v1::ModalModelSummary> GrpcClient::ImportModalModel(
   return std::move(*response.mutable_modal_model());
 }
 
-absl::StatusOr<v1::GetDatabaseStatsResponse> GrpcClient::GetDatabaseStats() const {
-  grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
-  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  v1::GetDatabaseStatsResponse response;
-  RETURN_IF_ERROR(FromRpc(stubs_->admin.GetDatabaseStats(&context, {}, &response), stubs_->server));
-  return response;
-}
-
 absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
   ASSIGN_OR_RETURN(WholeFile copy, WholeFile::Create(file));
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   const auto reader = stubs_->admin.BackUpDatabase(&context, {});
   v1::BackUpDatabaseResponse response;
   uint64_t byte_count = 0;
@@ -87,17 +75,6 @@ absl::Status GrpcClient::BackUpDatabase(const std::string& file) const {
     return absl::DataLossError("the daemon ended before the whole copy was sent");
   }
   return copy.Publish();
-}
-
-absl::StatusOr<v1::CollectGarbageResponse> GrpcClient::CollectGarbage(
-    const v1::CollectGarbageRequest& request) const {
-  grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
-  context.set_deadline(std::chrono::system_clock::now() + kCallTimeout);
-  v1::CollectGarbageResponse response;
-  RETURN_IF_ERROR(
-      FromRpc(stubs_->admin.CollectGarbage(&context, request, &response), stubs_->server));
-  return response;
 }
 
 }  // namespace carillon::client

@@ -3,13 +3,10 @@
 // The call of gRPC's own protocol of health, grpc.health.v1.
 #include <google/protobuf/wrappers.pb.h>
 #include <grpcpp/client_context.h>
-#include <grpcpp/completion_queue.h>
-#include <grpcpp/generic/generic_stub.h>
 
 #include <chrono>
 
 #include "client_sdk/cpp/internal/grpc_client.h"
-#include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::client {
@@ -28,20 +25,11 @@ constexpr int kServing = 1;
 
 absl::StatusOr<bool> GrpcClient::IsServing(const std::string& service) const {
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kHealthTimeout);
+  context.set_deadline(std::chrono::system_clock::now() + timeout_.value_or(kHealthTimeout));
   HealthRequest request;
   request.set_value(service);
   HealthResponse response;
-  grpc::Status status;
-  grpc::CompletionQueue queue;
-  grpc::TemplatedGenericStub<HealthRequest, HealthResponse> stub(stubs_->channel);
-  const auto call = stub.PrepareUnaryCall(&context, kCheck, request, &queue);
-  call->StartCall();
-  call->Finish(&response, &status, nullptr);
-  void* tag = nullptr;
-  bool ok = false;
-  queue.Next(&tag, &ok);
-  RETURN_IF_ERROR(FromRpc(status, stubs_->server));
+  RETURN_IF_ERROR(CallByPath(kCheck, request, response, context));
   return response.value() == kServing;
 }
 

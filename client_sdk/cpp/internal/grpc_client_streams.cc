@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/grpc_client.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "proto/cpp/error_reason.h"
@@ -124,7 +123,7 @@ Rendering ReceiveSound(const AudioCallback& on_block, const BlowCallback& on_blo
 
 absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   v1::UploadMeshResponse response;
   const auto writer = stubs_->models.UploadMesh(&context, &response);
   v1::UploadMeshRequest request;
@@ -140,7 +139,7 @@ absl::StatusOr<std::string> GrpcClient::UploadMesh(absl::string_view bytes) cons
 absl::StatusOr<v1::Job> GrpcClient::WatchJob(
     const std::string& name, const std::function<void(const v1::Job&)>& on_change) const {
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   v1::WatchJobRequest request;
   request.set_name(name);
   const auto reader = stubs_->decompositions.WatchJob(&context, request);
@@ -165,7 +164,7 @@ absl::Status GrpcClient::WatchJobs(
     const std::function<bool(const v1::WatchJobsResponse&)>& on_answer) const {
   RETURN_IF_ERROR(CheckCallback(on_answer, "on_answer"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   const auto reader = stubs_->decompositions.WatchJobs(&context, request);
   v1::WatchJobsResponse answer;
   bool stopped = false;
@@ -175,16 +174,12 @@ absl::Status GrpcClient::WatchJobs(
   return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
 }
 
-absl::Status GrpcClient::Listen(const AudioCallback& on_block) const {
-  return ListenTo(v1::ListenRequest(), on_block);
-}
-
 absl::Status GrpcClient::RecordContacts(
     const std::string& scene, const std::function<void()>& on_begun,
     const std::function<bool(const v1::ContactTraceRecord&)>& on_record) const {
   RETURN_IF_ERROR(CheckCallback(on_record, "on_record"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   v1::RecordContactsRequest request;
   request.set_scene(scene);
   const auto stream = stubs_->contacts.RecordContacts(&context, request);
@@ -202,11 +197,11 @@ absl::Status GrpcClient::RecordContacts(
   return stopped ? absl::OkStatus() : FromRpc(status, stubs_->server);
 }
 
-absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
-                                  const AudioCallback& on_block) const {
+absl::Status GrpcClient::Listen(const v1::ListenRequest& request,
+                                const AudioCallback& on_block) const {
   RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   const auto stream = stubs_->audio.Listen(&context, request);
   BlockReader reader;
   v1::ListenResponse response;
@@ -223,17 +218,11 @@ absl::Status GrpcClient::ListenTo(const v1::ListenRequest& request,
 
 absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
                                                      ContactTraceReader& trace,
-                                                     const AudioCallback& on_block) const {
-  return Render(settings, trace, on_block, nullptr);
-}
-
-absl::StatusOr<v1::RenderSummary> GrpcClient::Render(const v1::RenderSettings& settings,
-                                                     ContactTraceReader& trace,
                                                      const AudioCallback& on_block,
                                                      const BlowCallback& on_blow) const {
   RETURN_IF_ERROR(CheckCallback(on_block, "on_block"));
   grpc::ClientContext context;
-  Authorize(context, stubs_->server, stubs_->token);
+  Prepare(context);
   const auto call = stubs_->audio.Render(&context);
   // A second thread sends, because the daemon may send sound before it has the whole trace.
   absl::Status sent;

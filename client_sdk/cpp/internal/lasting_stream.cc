@@ -45,11 +45,10 @@ absl::StatusOr<v1::AddObjectsRequest> MissingObjects(const Client& client, const
   for (const v1::SoundingObject& object : present) models[object.handle()] = object.modal_model();
   v1::AddObjectsRequest missing;
   missing.set_scene(scene);
-  for (const v1::AddObjectRequest& wanted : registration.objects) {
+  for (const v1::NewObject& wanted : registration.objects) {
     const auto found = models.find(wanted.handle());
     if (found == models.end()) {
       *missing.add_objects() = wanted;
-      missing.mutable_objects()->rbegin()->clear_scene();
     } else if (found->second != wanted.modal_model()) {
       return Refusal(absl::StatusCode::kAlreadyExists, "OBJECT_EXISTS",
                      absl::StrCat(scene, "/objects/", wanted.handle(), " has the model ",
@@ -191,8 +190,7 @@ class LastingStream final : public ContactStream {
 absl::StatusOr<std::string> RegisterScene(const Client& client,
                                           const SceneRegistration& registration) {
   RETURN_IF_ERROR(Validate(registration));
-  ASSIGN_OR_RETURN(const v1::CreateSceneResponse scene,
-                   client.CreateOrFindScene(registration.scene));
+  ASSIGN_OR_RETURN(const v1::CreateSceneResponse scene, client.CreateScene(registration.scene));
   ASSIGN_OR_RETURN(const v1::AddObjectsRequest missing,
                    MissingObjects(client, scene.name(), registration));
   if (missing.objects_size() > 0) RETURN_IF_ERROR(client.AddObjects(missing).status());

@@ -5,8 +5,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/shortest_decimal.h"
-#include "proto/cpp/step_time.h"
 
 namespace carillon::client {
 

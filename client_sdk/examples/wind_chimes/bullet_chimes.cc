@@ -48,7 +48,7 @@ class BulletChimes {
     step_.set_time_s(static_cast<double>(step_count_++) * kStep_s);
     world_.stepSimulation(kStep_s, 0);
     if (purpose_ == Purpose::kPicture) contacts_.ReadPoses(step_);
-    for (v1::EngineContact& contact : *step_.mutable_contacts()) {
+    for (v1::Contact& contact : *step_.mutable_contacts()) {
       if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
     }
     return std::move(step_);

@@ -80,11 +80,12 @@ class LiveScene {
   explicit LiveScene(const std::string& server) : client_(client::Connect(server)) {}
 
   absl::Status Fill(const PlayOptions& options) {
-    ASSIGN_OR_RETURN(scene_, client_->CreateScene({}));
+    ASSIGN_OR_RETURN(const auto created, client_->CreateScene());
+    scene_ = created.name();
     v1::AddObjectsRequest tubes;
     tubes.set_scene(scene_);
     for (size_t i = 0; i < options.models.size(); ++i) {
-      v1::AddObjectRequest& tube = *tubes.add_objects();
+      v1::NewObject& tube = *tubes.add_objects();
       tube.set_modal_model(options.models[i]);
       tube.mutable_material()->set_preset(kMaterial);
       tube.set_gain(options.gain);

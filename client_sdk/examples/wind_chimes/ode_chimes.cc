@@ -34,7 +34,7 @@ class OdeChimes {
     BlowOnSail(time_s);
     v1::ContactStep step = world_.Step(time_s);
     if (purpose_ == Purpose::kPicture) world_.contacts().ReadPoses(step);
-    for (v1::EngineContact& contact : *step.mutable_contacts()) {
+    for (v1::Contact& contact : *step.mutable_contacts()) {
       if (!contact.has_second()) contact.mutable_hertz()->set_striker_radius_m(kClapperRadius_m);
     }
     return step;

@@ -13,6 +13,7 @@ const ROTATION = 'a quaternion [w, x, y, z] of length 1';
 const MEANINGS = {
   points: `metres ${STREAM_FRAME}`,
   impulses: `newton seconds ${STREAM_FRAME}`,
+  forces: `newtons ${STREAM_FRAME}`,
   secondPoints: `metres ${STREAM_FRAME}`,
   secondRotations: `${ROTATION} from the first object's frame into the second's`,
   positions: "metres in the scene's frame",
@@ -24,13 +25,21 @@ const OBJECT = 'an object that scene.add or trace.add returned, or its handle, a
 const PARTNER = 'a whole number from 0 to 4294967295 that names the other body, such as its place in your list of ' +
   'bodies';
 const DURATION = 'zero seconds or more, or NaN, which leaves it to the daemon';
-const STEP_KEYS = ['contacts', 'impulses', 'forces', 'poses', 'listener'];
-const FORCE_ROW_KEYS = ['object', 'point', 'force', 'roughness', 'second'];
-const IMPULSE_ROW_KEYS = ['object', 'point', 'impulse', 'duration', 'timeOffset', 'striker', 'second'];
-const CONTACT_ROW_KEYS = [...IMPULSE_ROW_KEYS, 'partner', 'roughness'];
-const IMPULSE_KEYS = ['objects', 'points', 'impulses', 'durations', 'timeOffsets', 'secondObjects', 'secondPoints',
-  'secondRotations', 'striker'];
-const CONTACT_KEYS = [...IMPULSE_KEYS, 'partners', 'travelSpeeds', 'roughnessDepth', 'irregularityLength'];
+const STEP_KEYS = ['contacts', 'impacts', 'forces', 'poses', 'listener'];
+const COLLISION = ['duration', 'timeOffset', 'striker'];
+const COLLISIONS = ['durations', 'timeOffsets', 'striker'];
+const SECOND_COLUMNS = ['secondObjects', 'secondPoints', 'secondRotations'];
+const ROUGH_COLUMNS = ['travelSpeeds', 'roughnessDepth', 'irregularityLength'];
+// The kinds of contacts in a step: of each the kind in the contract, the vector of a row and of columns, the field of
+// that vector, and what else rows and columns may have.
+const KINDS = {
+  contacts: { kind: 'CONTACT_KIND_REPORTED', vector: 'impulse', vectors: 'impulses', field: 'impulse_newton_seconds',
+    row: [...COLLISION, 'partner', 'roughness'], columns: [...COLLISIONS, 'partners', ...ROUGH_COLUMNS] },
+  impacts: { kind: 'CONTACT_KIND_IMPACT', vector: 'impulse', vectors: 'impulses', field: 'impulse_newton_seconds',
+    row: COLLISION, columns: COLLISIONS },
+  forces: { kind: 'CONTACT_KIND_FORCE', vector: 'force', vectors: 'forces', field: 'force_newtons',
+    row: ['roughness'], columns: ROUGH_COLUMNS },
+};
 
 /** Copies the fields that differ from their default: others are not written, as in every other language. */
 function present(fields) {
@@ -135,43 +144,44 @@ function numbers(values, count, name, read = number) {
   return list;
 }
 
-function impulseColumns(columns, keys = IMPULSE_KEYS, where = 'impulses') {
-  refuseUnknown(columns, keys, where);
+/** The message of contacts given as columns; `name` is their key in the step. */
+function contactColumns(columns, name) {
+  const { kind, vectors, field, columns: keys } = KINDS[name];
+  refuseUnknown(columns, ['objects', 'points', vectors, ...SECOND_COLUMNS, ...keys], name);
   const point_m = table(columns.points, 'points');
-  const impulse_newton_seconds = table(columns.impulses, 'impulses');
-  if (point_m.length !== impulse_newton_seconds.length) {
-    throw new RangeError(`points has the numbers of ${counted(point_m.length / 3, 'contact')} and impulses has those of ` +
-      `${impulse_newton_seconds.length / 3}; each contact needs both`);
+  const values = table(columns[vectors], vectors);
+  if (point_m.length !== values.length) {
+    throw new RangeError(`points has the numbers of ${counted(point_m.length / 3, 'contact')} and ${vectors} has those of ` +
+      `${values.length / 3}; each contact needs both`);
   }
   const count = point_m.length / 3;
-  const made = { object: handles(columns.objects, count), point_m, impulse_newton_seconds };
-  // A duration below zero is absent.
-  if (columns.durations !== undefined) {
-    made.duration_s = numbers(columns.durations, count, 'durations', (value, name) => durationOf(value, name) ?? -1);
-  }
-  if (columns.timeOffsets !== undefined) made.time_offset_s = numbers(columns.timeOffsets, count, 'timeOffsets');
-  if (columns.secondObjects !== undefined) {
-    made.second_object = handles(columns.secondObjects, count, 'secondObjects');
-    made.second_point_m = table(columns.secondPoints, 'secondPoints');
-    if (columns.secondRotations) made.second_rotation = table(columns.secondRotations, 'secondRotations', 4);
-  }
-  return { ...made, ...given('hertz', toStriker(columns.striker)) };
+  const { roughnessDepth, irregularityLength } = columns;
+  refuseNoNumbers({ roughnessDepth, irregularityLength }, name);
+  return { kind, object: handles(columns.objects, count), point_m, [field]: values, ...numberColumns(columns, count),
+    ...present({ roughness_depth: roughnessDepth, irregularity_length_m: irregularityLength }),
+    ...secondColumns(columns, count), ...given('hertz', toStriker(columns.striker)) };
 }
 
-function contactColumns(columns) {
-  const impulses = impulseColumns(columns, CONTACT_KEYS, 'contacts');
-  const { roughnessDepth, irregularityLength } = columns;
-  refuseNoNumbers({ roughnessDepth, irregularityLength }, 'contacts');
-  const count = impulses.object.length;
-  const made = { impulses };
-  if (columns.partners !== undefined) {
-    made.partner = numbers(columns.partners, count, 'partners', (value, name) => whole(value, name, PARTNER));
+/** The columns of one number a contact, as far as they are given. */
+function numberColumns({ durations, timeOffsets, partners, travelSpeeds }, count) {
+  const made = {};
+  // A duration below zero is absent.
+  if (durations !== undefined) {
+    made.duration_s = numbers(durations, count, 'durations', (value, name) => durationOf(value, name) ?? -1);
   }
-  if (columns.travelSpeeds !== undefined) {
-    made.travel_speed_m_per_s = numbers(columns.travelSpeeds, count, 'travelSpeeds');
+  if (timeOffsets !== undefined) made.time_offset_s = numbers(timeOffsets, count, 'timeOffsets');
+  if (partners !== undefined) {
+    made.partner = numbers(partners, count, 'partners', (value, name) => whole(value, name, PARTNER));
   }
-  return { ...made,
-    ...present({ depth: roughnessDepth, irregularity_length_m: irregularityLength }) };
+  if (travelSpeeds !== undefined) made.travel_speed_m_per_s = numbers(travelSpeeds, count, 'travelSpeeds');
+  return made;
+}
+
+function secondColumns({ secondObjects, secondPoints, secondRotations }, count) {
+  if (secondObjects === undefined) return {};
+  return { second_object: handles(secondObjects, count, 'secondObjects'),
+    second_point_m: table(secondPoints, 'secondPoints'),
+    ...given('second_rotation', secondRotations && table(secondRotations, 'secondRotations', 4)) };
 }
 
 function secondObject(second, where) {
@@ -187,29 +197,18 @@ function toRoughness(roughness, where) {
   return roughness;
 }
 
-/** What rows of impulses and of contacts have in common. */
-function impulseRow(row, where, keys = IMPULSE_ROW_KEYS) {
-  refuseUnknown(row, keys, where);
+/** The message of one contact; `name` is the key of the list in the step that has it. */
+function contactRow(row, name, where) {
+  const { kind, vector: key, vectors, field, row: keys } = KINDS[name];
+  refuseUnknown(row, ['object', 'point', key, 'second', ...keys], where);
   refuseNoNumbers({ timeOffset: row.timeOffset }, where);
-  return { ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset }),
-    point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
-    impulse_newton_seconds: vector(row.impulse, `impulse of ${where}`, MEANINGS.impulses),
-    ...given('duration_s', durationOf(row.duration, `duration of ${where}`)), ...given('hertz', toStriker(row.striker)),
-    ...given('second', secondObject(row.second, where)) };
-}
-
-function contactRow(row, where) {
-  return { ...impulseRow(row, where, CONTACT_ROW_KEYS),
-    ...present({ partner: partnerOf(row.partner, `partner of ${where}`) }),
-    ...given('roughness', toRoughness(row.roughness, where)) };
-}
-
-function forceRow(row, where) {
-  refuseUnknown(row, FORCE_ROW_KEYS, where);
-  return { ...present({ object: handleOf(row.object, `object of ${where}`) }),
-    point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
-    force_newtons: vector(row.force, `force of ${where}`, `newtons ${STREAM_FRAME}`),
-    ...given('roughness', toRoughness(row.roughness, where)), ...given('second', secondObject(row.second, where)) };
+  return { kind, ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset,
+    partner: partnerOf(row.partner, `partner of ${where}`) }),
+  point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
+  [field]: vector(row[key], `${key} of ${where}`, MEANINGS[vectors]),
+  ...given('duration_s', durationOf(row.duration, `duration of ${where}`)),
+  ...given('roughness', toRoughness(row.roughness, where)), ...given('hertz', toStriker(row.striker)),
+  ...given('second', secondObject(row.second, where)) };
 }
 
 function poseColumns(columns) {
@@ -221,22 +220,25 @@ function poseColumns(columns) {
 }
 
 /**
- * Makes the message of the step at a simulation time, seconds. Contacts and impulses are rows if they are an array, and
- * columns otherwise.
+ * Makes the message of the step at a simulation time, seconds. Contacts, impacts and forces are rows if they are an
+ * array, and columns otherwise.
  */
 function makeStep(time, own) {
   const content = own ?? {};
   if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
   refuseUnknown(content, STEP_KEYS, 'step');
-  const { contacts, impulses, forces, poses, listener } = content;
   const step = present({ time_s: time });
-  if (Array.isArray(impulses)) step.impulses = impulses.map((row, i) => impulseRow(row, `impulses[${i}]`));
-  else if (impulses) step.columns = impulseColumns(impulses);
-  if (forces) step.sustained = forces.map((row, i) => forceRow(row, `forces[${i}]`));
-  if (Array.isArray(contacts)) step.contacts = contacts.map((row, i) => contactRow(row, `contacts[${i}]`));
-  else if (contacts) step.contact_columns = contactColumns(contacts);
-  if (listener) step.listener = toPose(listener, 'listener');
-  if (poses) step.pose_columns = poseColumns(poses);
+  for (const name of Object.keys(KINDS)) {
+    const contacts = content[name];
+    if (Array.isArray(contacts)) {
+      const rows = contacts.map((row, i) => contactRow(row, name, `${name}[${i}]`));
+      step.contacts = [...step.contacts ?? [], ...rows];
+    } else if (contacts) {
+      step.contact_columns = [...step.contact_columns ?? [], contactColumns(contacts, name)];
+    }
+  }
+  if (content.listener) step.listener = toPose(content.listener, 'listener');
+  if (content.poses) step.poses = poseColumns(content.poses);
   return step;
 }
 
@@ -256,8 +258,8 @@ function refuseTime(time, number, before, repair) {
 }
 
 /** The number of contacts and poses of a step. */
-function countRows({ impulses, columns, sustained, contacts, contact_columns, pose_columns }) {
-  const lists = [impulses, columns?.object, sustained, contacts, contact_columns?.impulses.object, pose_columns?.object];
+function countRows({ contacts, contact_columns, poses }) {
+  const lists = [contacts, poses?.object, ...(contact_columns ?? []).map((columns) => columns.object)];
   return lists.reduce((count, list) => count + (list?.length ?? 0), 0);
 }
 

@@ -52,61 +52,79 @@ export interface Strike {
   striker?: Striker;
 }
 
-/** One impulse of a step. */
-export interface ImpulseRow extends Strike {
+/** The other body of a contact, if it is an object, too. */
+export interface Second { object: ObjectLike; point: Vector; rotation?: Rotation }
+
+/** A blow that you intend, such as that of a hammer. */
+export interface Impact extends Strike {
   object: ObjectLike;
   /** Seconds from the step's time. */
   timeOffset?: number;
-  second?: { object: ObjectLike; point: Vector; rotation?: Rotation };
+  second?: Second;
 }
 
 /** One contact as an engine reports it: the impulse over the whole step, also at rest. */
-export interface ContactRow extends ImpulseRow {
+export interface Contact extends Impact {
   /** A whole number from 0 to 4294967295 that names the other body. */
   partner?: number;
   roughness?: Roughness;
 }
 
-/** A sustained force of a simulator that separates loads from blows itself. */
-export interface ForceRow {
+/** A contact force, of a simulator that separates resting contacts from impacts itself. */
+export interface ContactForce {
   object: ObjectLike;
   point: Vector;
   /** Newtons. */
   force: Vector;
   roughness?: Roughness;
-  second?: { object: ObjectLike; point: Vector; rotation?: Rotation };
+  second?: Second;
 }
 
-/** Impulses as columns. One object, or one number, stands for all rows. */
-export interface ImpulseColumns {
+/** What all contacts have as columns. One object, or one number, stands for all rows. */
+export interface ContactPlaces {
   objects: ObjectLike | ArrayLike<ObjectLike>;
   points: Table;
-  impulses: Table;
-  /** Seconds, zero or more; NaN leaves one to the daemon. */
-  durations?: number | ArrayLike<number>;
-  timeOffsets?: number | ArrayLike<number>;
   secondObjects?: ObjectLike | ArrayLike<ObjectLike>;
   secondPoints?: Table;
   secondRotations?: Table;
-  striker?: Striker;
 }
 
-/** An engine's contacts as columns. */
-export interface ContactColumns extends ImpulseColumns {
-  /** Whole numbers from 0 to 4294967295 that name the other bodies. */
-  partners?: number | ArrayLike<number>;
+/** The roughness of contacts that slide or roll, as columns. */
+export interface ContactRoughness {
   travelSpeeds?: number | ArrayLike<number>;
   roughnessDepth?: number;
   irregularityLength?: number;
 }
 
-/** What a step holds. */
+/** Impacts as columns. */
+export interface Impacts extends ContactPlaces {
+  impulses: Table;
+  /** Seconds, zero or more; NaN leaves one to the daemon. */
+  durations?: number | ArrayLike<number>;
+  timeOffsets?: number | ArrayLike<number>;
+  striker?: Striker;
+}
+
+/** An engine's contacts as columns. */
+export interface Contacts extends Impacts, ContactRoughness {
+  /** Whole numbers from 0 to 4294967295 that name the other bodies. */
+  partners?: number | ArrayLike<number>;
+}
+
+/** Contact forces as columns. */
+export interface ContactForces extends ContactPlaces, ContactRoughness {
+  /** Newtons. */
+  forces: Table;
+}
+
+/** What a step has. */
 export interface StepContent {
   /** What an engine reports, in every step. */
-  contacts?: ContactRow[] | ContactColumns;
+  contacts?: Contact[] | Contacts;
   /** Strikes. */
-  impulses?: ImpulseRow[] | ImpulseColumns;
-  forces?: ForceRow[];
+  impacts?: Impact[] | Impacts;
+  /** Of a simulator that separates resting contacts from impacts itself. */
+  forces?: ContactForce[] | ContactForces;
   poses?: { objects: ObjectLike | ArrayLike<ObjectLike>; positions: Table; orientations?: Table };
   listener?: Pose;
 }

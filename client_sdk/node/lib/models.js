@@ -72,7 +72,7 @@ class Model {
     refuseNoNumbers({ size, gain, seconds, sampleRateHz }, 'renderStrike');
     const trace = new Trace({ simulator: 'carillon (Node)' });
     const object = trace.add(this, { material, size, gain });
-    trace.step(0, { impulses: strikeOf(object, strike) });
+    trace.step(0, { impacts: strikeOf(object, strike) });
     return this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz });
   }
 

@@ -35,9 +35,9 @@ class SoundingObject {
   /** Strikes the object now. Throws CarillonError if the strike is refused, and warns of a point far from the object. */
   async strike(strike) {
     refuseUnknown(strike, ['point', 'impulse', 'duration', 'striker'], 'strike');
-    const impulses = strikeOf(this, strike);
+    const impacts = strikeOf(this, strike);
     const stream = this.scene.stream({ step: 0.001, delay: 0 });
-    stream.step(0, { impulses });
+    stream.step(0, { impacts });
     await stream.close(false);
     if (stream.rejection) throw stream.rejection;
     warnOfContacts(stream.warnings);
@@ -86,17 +86,17 @@ class Scene {
    * its place.
    */
   async addAll(objects) {
-    const request = { scene: this.name, objects: objects.map((object, i) => this.request(object, `object ${i} of addAll`)) };
+    const request = { scene: this.name, objects: objects.map((object, i) => this.newObject(object, `object ${i} of addAll`)) };
     const answer = await this.client.call('SceneService', 'AddObjects', request);
     return answer.objects.map((object) => new SoundingObject(this, object));
   }
 
-  /** The request for an object. */
-  request(object, where) {
+  /** The part of a request that describes an object. */
+  newObject(object, where) {
     refuseUnknown(object, ['model', ...OBJECT_KEYS, 'handle'], where);
     const { model, material, size, gain, pose, handle, radiation } = object;
     refuseNoNumbers({ size, gain }, where);
-    return { scene: this.name, ...named(model, material), ...present({ size, handle: toHandle(handle) }),
+    return { ...named(model, material), ...present({ size, handle: toHandle(handle) }),
       ...given('gain', gain), ...given('pose', toPose(pose)), ...present({ radiation: toRadiation(radiation) }) };
   }
 
@@ -106,8 +106,9 @@ class Scene {
    */
   async add(model, settings = {}) {
     refuseNoObject(settings, OBJECT_KEYS, 'add');
-    const answer = await this.client.call('SceneService', 'AddObject', this.request({ ...settings, model }, 'add'));
-    return new SoundingObject(this, answer.object);
+    const request = { scene: this.name, objects: [this.newObject({ ...settings, model }, 'add')] };
+    const answer = await this.client.call('SceneService', 'AddObjects', request);
+    return new SoundingObject(this, answer.objects[0]);
   }
 
   /** Returns the objects of the scene by their handles. */
@@ -219,7 +220,7 @@ class ContactStream {
     while (this.waiting.length && !this.isFull) {
       const steps = this.takeSteps();
       this.handedCount += steps.length;
-      this.isFull = !this.call.write(steps.length === 1 ? { step: steps[0] } : { steps: { steps } }, () => {
+      this.isFull = !this.call.write({ steps }, () => {
         this.handedCount -= steps.length;
       });
     }
@@ -294,7 +295,7 @@ class ContactStream {
         'sound; open another one by scene.stream');
     }
     if (this.error) throw this.error;
-    for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
+    for (const rows of [content?.contacts, content?.impacts, content?.forces, content?.poses]) {
       refuseOtherScenes(rows, this.start.scene);
     }
     const made = makeStep(time, content);

@@ -19,7 +19,7 @@ function streamSettings({ frame, pulseShape }) {
 
 /**
  * A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
- * the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left out,
+ * the simulator's steps in seconds, is needed for all but impacts: by it the daemon knows whether a step was left out,
  * and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay.
  */
 class Trace {
@@ -55,7 +55,7 @@ class Trace {
       throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
         'stream: new Trace({ step: 1 / 240 })');
     }
-    for (const rows of [content?.contacts, content?.impulses, content?.forces, content?.poses]) {
+    for (const rows of [content?.contacts, content?.impacts, content?.forces, content?.poses]) {
       const other = objectsOf(rows).find((object) => object?.scene);
       if (other) {
         throw new TypeError(`a row has an object of ${other.scene.name}, which is not in the trace; give what trace.add ` +

@@ -17,12 +17,12 @@ ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 v1::ContactFindings ToProto(const IntakeFindings& findings);
 v1::Blow ToProto(const BlowRecord& blow);
 
-/// Returns the number of impulses, forces, contacts and poses in a step.
+/// Returns the number of contacts and poses in a step.
 size_t CountRows(const v1::ContactStep& step);
 
-/// Gives `intake` a whole step, in the order poses, impulses, forces, engine contacts; of each
-/// kind, rows come before columns. Rows that cannot be read count as rejected (LOCATION_MISSING,
-/// COLUMNS_MISMATCHED). Errors: those of ContactIntake::BeginStep.
+/// Gives `intake` a whole step, in the order poses, contacts as rows, contacts as columns. Contacts
+/// that cannot be read count as rejected (CONTACT_MALFORMED, COLUMNS_MISMATCHED, UNKNOWN_STRIKER).
+/// Errors: those of ContactIntake::BeginStep.
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake);
 
 }  // namespace carillon

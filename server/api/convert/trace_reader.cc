@@ -8,9 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 #include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
-#include "proto/cpp/step_time.h"
 #include "server/api/convert/contact_conversion.h"
 #include "server/api/convert/object_conversion.h"
 #include "server/api/convert/pose_conversion.h"

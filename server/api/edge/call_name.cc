@@ -11,15 +11,17 @@
 namespace carillon {
 namespace {
 
-constexpr const char* kServices[] = {"AdminService",         "AudioService",  "ContactService",
-                                     "DecompositionService", "JobRunService", "SceneService",
-                                     "ModalModelService",    "ServerService"};
+constexpr const char* kServices[] = {
+    "carillon.v1.AdminService",      "carillon.v1.AudioService",
+    "carillon.v1.ContactService",    "carillon.v1.DecompositionService",
+    "carillon.v1.ModalModelService", "carillon.v1.SceneService",
+    "carillon.v1.ServerService",     "carillon.worker.v1.JobRunService"};
 
 std::map<std::string, std::string, std::less<>> NamesOfCalls() {
   std::map<std::string, std::string, std::less<>> names;
   for (const char* service : kServices) {
-    const auto* described = google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(
-        absl::StrCat("carillon.v1.", service));
+    const auto* described =
+        google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(service);
     for (int i = 0; described != nullptr && i < described->method_count(); ++i) {
       const std::string& name = described->method(i)->name();
       names[name] = absl::StrCat("/", described->full_name(), "/", name);

@@ -15,9 +15,6 @@
 
 namespace carillon {
 
-/// The largest message that gRPC accepts.
-inline constexpr size_t kMaxMessageBytes = size_t{2} << 20U;
-
 /// Memory that gRPC may take for the connections of one group of addresses over TCP.
 inline constexpr size_t kTcpMemoryBytes = size_t{96} << 20U;
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/match.h"
+#include "proto/cpp/limits.h"
 #include "server/api/edge/client_limits.h"
 
 namespace carillon {

@@ -52,18 +52,13 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
  private:
   absl::Status Take(const v1::StreamContactsRequest& request) override {
-    switch (request.request_case()) {
-      case v1::StreamContactsRequest::kStart:
-        return Open(request.start());
-      case v1::StreamContactsRequest::kStep:
-        return Step(request.step());
-      case v1::StreamContactsRequest::kSteps:
-        for (const v1::ContactStep& step : request.steps().steps()) RETURN_IF_ERROR(Step(step));
-        return absl::OkStatus();
-      default:
-        return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
-                       "a request is neither start nor step nor steps");
+    if (!request.has_start() && request.steps().empty()) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+                     "a request has neither start nor steps");
     }
+    if (request.has_start()) RETURN_IF_ERROR(Open(request.start()));
+    for (const v1::ContactStep& step : request.steps()) RETURN_IF_ERROR(Step(step));
+    return absl::OkStatus();
   }
 
   bool gone() const override { return context_.IsCancelled(); }

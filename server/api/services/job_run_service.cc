@@ -49,7 +49,7 @@ class ResultSink {
  public:
   ResultSink(RemoteRuns& runs, RunCaller caller) : runs_(&runs), caller_(std::move(caller)) {}
 
-  absl::Status Append(const v1::UploadResultRequest& request) {
+  absl::Status Append(const worker::v1::UploadResultRequest& request) {
     RETURN_IF_ERROR(Begin(request.job()));
     if (end_) return Drop(Incomplete("something follows the end of the run"));
     if (request.has_record()) return Drop(upload_->Append(request.record()));
@@ -58,7 +58,7 @@ class ResultSink {
     return absl::OkStatus();
   }
 
-  absl::Status Finish(v1::UploadResultResponse&) {
+  absl::Status Finish(worker::v1::UploadResultResponse&) {
     if (!upload_ || !end_) return Drop(Incomplete("the end of the run has not come"));
     return Drop(upload_->Finish(*end_));
   }
@@ -82,11 +82,11 @@ class ResultSink {
   RemoteRuns* runs_;
   RunCaller caller_;
   std::optional<RunUpload> upload_;
-  std::optional<v1::RunEnd> end_;
+  std::optional<worker::v1::RunEnd> end_;
 };
 
 /// Sends a mesh file piece by piece.
-class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
+class MeshCall final : public ServerStream<worker::v1::FetchMeshResponse> {
  public:
   MeshCall(RemoteRuns& runs, std::string job, RunCaller caller, ThreadPool& pool)
       : StreamWriter(&pool), runs_(runs), job_(std::move(job)), caller_(std::move(caller)) {
@@ -94,7 +94,7 @@ class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
   }
 
  private:
-  absl::StatusOr<Supply> Fill(v1::FetchMeshResponse& response) override {
+  absl::StatusOr<Supply> Fill(worker::v1::FetchMeshResponse& response) override {
     if (!std::exchange(begun_, true)) RETURN_IF_ERROR(Begin());
     return mesh_.Next(*response.mutable_data());
   }
@@ -116,14 +116,14 @@ class MeshCall final : public ServerStream<v1::FetchMeshResponse> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::FetchMeshResponse>* JobRunService::FetchMesh(
-    grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) {
+grpc::ServerWriteReactor<worker::v1::FetchMeshResponse>* JobRunService::FetchMesh(
+    grpc::CallbackServerContext* context, const worker::v1::FetchMeshRequest* request) {
   return new MeshCall(runs_, request->job(), RunCaller(access_, *context), pool_);
 }
 
-grpc::ServerUnaryReactor* JobRunService::ReportProgress(grpc::CallbackServerContext* context,
-                                                        const v1::ReportProgressRequest* request,
-                                                        v1::ReportProgressResponse*) {
+grpc::ServerUnaryReactor* JobRunService::ReportProgress(
+    grpc::CallbackServerContext* context, const worker::v1::ReportProgressRequest* request,
+    worker::v1::ReportProgressResponse*) {
   return Answer(context, pool_, [this, request, caller = RunCaller(access_, *context)] {
     ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->job()));
     return caller.Note(runs_.Report(digest, caller.token(), request->progress()));
@@ -131,9 +131,10 @@ grpc::ServerUnaryReactor* JobRunService::ReportProgress(grpc::CallbackServerCont
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* JobRunService::UploadResultRaw(
-    grpc::CallbackServerContext* context, v1::UploadResultResponse* response) {
-  return new ReadCall<v1::UploadResultRequest, v1::UploadResultResponse, ResultSink>(
-      *context, *response, ResultSink(runs_, RunCaller(access_, *context)), pool_);
+    grpc::CallbackServerContext* context, worker::v1::UploadResultResponse* response) {
+  return new ReadCall<worker::v1::UploadResultRequest, worker::v1::UploadResultResponse,
+                      ResultSink>(*context, *response,
+                                  ResultSink(runs_, RunCaller(access_, *context)), pool_);
 }
 
 }  // namespace carillon

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "carillon/v1/job_run_service.grpc.pb.h"
+#include "carillon/worker/v1/job_run_service.grpc.pb.h"
 #include "server/api/call/raw_service.h"
 #include "server/api/call/thread_pool.h"
 #include "server/api/edge/access_control.h"
@@ -9,9 +9,9 @@
 
 namespace carillon {
 
-/// carillon.v1.JobRunService. The objects that the constructor gets by reference must outlive the
-/// service.
-class JobRunService final : public RawService<v1::JobRunService> {
+/// carillon.worker.v1.JobRunService. The objects that the constructor gets by reference must
+/// outlive the service.
+class JobRunService final : public RawService<worker::v1::JobRunService> {
  public:
   /// Wrong tokens are logged through `access`.
   JobRunService(RemoteRuns& runs, AccessControl& access, ThreadPool& pool)
@@ -19,15 +19,15 @@ class JobRunService final : public RawService<v1::JobRunService> {
     ReadRaw("UploadResult", &JobRunService::UploadResultRaw);
   }
 
-  grpc::ServerWriteReactor<v1::FetchMeshResponse>* FetchMesh(
-      grpc::CallbackServerContext* context, const v1::FetchMeshRequest* request) override;
+  grpc::ServerWriteReactor<worker::v1::FetchMeshResponse>* FetchMesh(
+      grpc::CallbackServerContext* context, const worker::v1::FetchMeshRequest* request) override;
   grpc::ServerUnaryReactor* ReportProgress(grpc::CallbackServerContext* context,
-                                           const v1::ReportProgressRequest* request,
-                                           v1::ReportProgressResponse* response) override;
+                                           const worker::v1::ReportProgressRequest* request,
+                                           worker::v1::ReportProgressResponse* response) override;
 
  private:
-  grpc::ServerReadReactor<grpc::ByteBuffer>* UploadResultRaw(grpc::CallbackServerContext* context,
-                                                             v1::UploadResultResponse* response);
+  grpc::ServerReadReactor<grpc::ByteBuffer>* UploadResultRaw(
+      grpc::CallbackServerContext* context, worker::v1::UploadResultResponse* response);
 
   RemoteRuns& runs_;
   AccessControl& access_;

@@ -141,24 +141,13 @@ grpc::ServerUnaryReactor* SceneService::ListObjects(grpc::CallbackServerContext*
       });
 }
 
-grpc::ServerUnaryReactor* SceneService::AddObject(grpc::CallbackServerContext* context,
-                                                  const v1::AddObjectRequest* request,
-                                                  v1::AddObjectResponse* response) {
-  return Answer(context, reception_, Role::kStrike,
-                [this, context, request, response](const Principal& caller) {
-                  ASSIGN_OR_RETURN(const uint64_t scene,
-                                   owners_.Parse(*context, caller, request->scene()));
-                  return Add(scene, *request, *response);
-                });
-}
-
 grpc::ServerUnaryReactor* SceneService::AddObjects(grpc::CallbackServerContext* context,
                                                    const v1::AddObjectsRequest* request,
                                                    v1::AddObjectsResponse* response) {
   return AnswerFairly(
       context, reception_, adding_, [this, context, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(const uint64_t scene, owners_.Parse(*context, caller, request->scene()));
-        return AddAll(*context, scene, *request, *response);
+        return Add(*context, scene, *request, *response);
       });
 }
 
@@ -274,33 +263,16 @@ absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
   return reception_.limits.Check("objects", SceneRegistry::kMaxObjectCount, held, more);
 }
 
-absl::Status SceneService::Add(uint64_t scene, const v1::AddObjectRequest& request,
-                               v1::AddObjectResponse& response) {
-  ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(request, database_.models()));
-  RETURN_IF_ERROR(CheckObjectCount(scene, 1));
-  ASSIGN_OR_RETURN(
-      const PlacedObject placed,
-      scenes_.AddObject(scene, request.handle(), std::move(object.model), object.properties));
-  *response.mutable_object() = ToProto(scenes_.NameOf(scene), placed);
-  return absl::OkStatus();
-}
-
-absl::Status SceneService::AddAll(const grpc::CallbackServerContext& context, uint64_t scene,
-                                  const v1::AddObjectsRequest& request,
-                                  v1::AddObjectsResponse& response) {
+absl::Status SceneService::Add(const grpc::CallbackServerContext& context, uint64_t scene,
+                               const v1::AddObjectsRequest& request,
+                               v1::AddObjectsResponse& response) {
   RETURN_IF_ERROR(CheckObjectCount(scene, static_cast<size_t>(request.objects_size())));
   std::vector<NewObject> objects;
-  for (const v1::AddObjectRequest& wanted : request.objects()) {
+  for (const v1::NewObject& wanted : request.objects()) {
     if (context.IsCancelled()) return absl::CancelledError("the caller has gone");
-    const size_t index = objects.size();
-    if (!wanted.scene().empty() && wanted.scene() != request.scene()) {
-      return AtElement(Refusal(absl::StatusCode::kInvalidArgument, "INVALID_NAME",
-                               absl::StrCat("it names \"", wanted.scene(), "\" and the call \"",
-                                            request.scene(), "\": leave its scene empty")),
-                       "objects", index);
-    }
     absl::StatusOr<ObjectOfModel> object = ToObject(wanted, database_.models());
-    if (!object.ok()) return AtElement(object.status(), "objects", index);
+    if (!object.ok() && request.objects_size() == 1) return object.status();
+    if (!object.ok()) return AtElement(object.status(), "objects", objects.size());
     objects.push_back({.handle = wanted.handle(),
                        .model = std::move(object->model),
                        .properties = std::move(object->properties)});

@@ -53,9 +53,6 @@ class SceneService final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* ListObjects(grpc::CallbackServerContext* context,
                                         const v1::ListObjectsRequest* request,
                                         v1::ListObjectsResponse* response) override;
-  grpc::ServerUnaryReactor* AddObject(grpc::CallbackServerContext* context,
-                                      const v1::AddObjectRequest* request,
-                                      v1::AddObjectResponse* response) override;
   grpc::ServerUnaryReactor* AddObjects(grpc::CallbackServerContext* context,
                                        const v1::AddObjectsRequest* request,
                                        v1::AddObjectsResponse* response) override;
@@ -87,10 +84,8 @@ class SceneService final : public v1::SceneService::CallbackService {
   /// Checks that the scene's client may have this number of further objects, in all its scenes
   /// together. Errors: ResourceExhausted (CLIENT_LIMIT_REACHED).
   absl::Status CheckObjectCount(uint64_t scene, size_t more) const;
-  absl::Status Add(uint64_t scene, const v1::AddObjectRequest& request,
-                   v1::AddObjectResponse& response);
-  absl::Status AddAll(const grpc::CallbackServerContext& context, uint64_t scene,
-                      const v1::AddObjectsRequest& request, v1::AddObjectsResponse& response);
+  absl::Status Add(const grpc::CallbackServerContext& context, uint64_t scene,
+                   const v1::AddObjectsRequest& request, v1::AddObjectsResponse& response);
   absl::Status Update(uint64_t scene, uint32_t handle, const v1::UpdateObjectRequest& request,
                       v1::UpdateObjectResponse& response);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/services/server_service.h"
 
+#include "proto/cpp/limits.h"
 #include "server/api/edge/client_limits.h"
 #include "server/audio_device/block_broadcast.h"
 #include "server/mode_database/mesh_store.h"
@@ -51,6 +52,8 @@ void ServerService::DescribeLimits(v1::ServerLimits& limits) const {
   limits.set_mesh_bytes(MeshStore::kMaxByteCount);
   limits.set_page_size(kMaxPageSize);
   limits.set_scene_grace_s(facts_.scene_grace_s);
+  limits.set_label_bytes(kMaxLabelBytes);
+  limits.set_step_time_s(kLargestStepTimeS);
 }
 
 }  // namespace carillon

@@ -97,8 +97,8 @@ def measure_objects(build, folder):
 
         def add():
             begun = time.monotonic()
-            added = client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-                scene=scene, modal_model=model, material=material)).object
+            added = client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+                scene=scene, objects=[scene_service_pb2.NewObject(modal_model=model, material=material)])).objects[0]
             return time.monotonic() - begun, added.name
 
         def remove(name):

@@ -37,7 +37,8 @@ struct Options {
   double messages_per_second = 0;
 };
 
-void AddColumns(const Options& options, carillon::v1::ImpulseColumns& columns) {
+void AddColumns(const Options& options, carillon::v1::ContactColumns& columns) {
+  columns.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
   std::array<float, 3> point_m = kPointM;
   for (uint32_t i = 0; i < options.impulse_count; ++i) {
     if (options.spread) {
@@ -52,7 +53,8 @@ void AddColumns(const Options& options, carillon::v1::ImpulseColumns& columns) {
 }
 
 void AddRow(uint32_t i, carillon::v1::ContactStep& step) {
-  carillon::v1::Impulse& impulse = *step.add_impulses();
+  carillon::v1::Contact& impulse = *step.add_contacts();
+  impulse.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
   impulse.set_object(1 + i % kObjectCount);
   impulse.mutable_point_m()->set_y(kPointM[1]);
   impulse.mutable_point_m()->set_z(kPointM[2]);
@@ -63,7 +65,7 @@ void AddRow(uint32_t i, carillon::v1::ContactStep& step) {
 carillon::v1::ContactStep MakeStep(double time_s, const Options& options) {
   carillon::v1::ContactStep step;
   step.set_time_s(time_s);
-  if (options.columns) AddColumns(options, *step.mutable_columns());
+  if (options.columns) AddColumns(options, *step.add_contact_columns());
   for (uint32_t i = 0; !options.columns && i < options.impulse_count; ++i) AddRow(i, step);
   return step;
 }

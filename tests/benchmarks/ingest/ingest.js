@@ -17,9 +17,9 @@ function maker(form, count) {
   if (form === 'columns') {
     const points = Float32Array.from(handles.flatMap(() => POINT));
     const impulses = Float32Array.from(handles.flatMap(() => IMPULSE));
-    return () => ({ impulses: { objects: handles, points, impulses, durations: DURATION_S } });
+    return () => ({ impacts: { objects: handles, points, impulses, durations: DURATION_S } });
   }
-  return () => ({ impulses: handles.map((object) => (
+  return () => ({ impacts: handles.map((object) => (
     { object, point: POINT, impulse: IMPULSE, duration: DURATION_S })) });
 }
 

@@ -23,15 +23,15 @@ def maker(form, count):
     """Returns the function that makes the step of a time."""
     handles = 1 + numpy.arange(count) % OBJECT_COUNT
     if form == "columns":
-        impulses = carillon.Impulses(handles, numpy.tile(POINT, (count, 1)), numpy.tile(IMPULSE, (count, 1)),
-                                     durations=DURATION_S)
-        return lambda time_s: make_step(time_s, impulses=impulses)
+        impacts = carillon.Impacts(handles, numpy.tile(POINT, (count, 1)), numpy.tile(IMPULSE, (count, 1)),
+                                   durations=DURATION_S)
+        return lambda time_s: make_step(time_s, impacts=impacts)
 
     def make_rows(time_s):
         step = contact_pb2.ContactStep(time_s=time_s)
         for handle in handles.tolist():
-            step.impulses.add(object=handle, point_m=vector(POINT), impulse_newton_seconds=vector(IMPULSE),
-                              duration_s=DURATION_S)
+            step.contacts.add(kind=contact_pb2.CONTACT_KIND_IMPACT, object=handle, point_m=vector(POINT),
+                              impulse_newton_seconds=vector(IMPULSE), duration_s=DURATION_S)
         return step
 
     return make_rows

@@ -151,7 +151,7 @@ class Studio:
         header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="truth", step_s=0.001)
         if heard.gaussian and knows("contact_trace", "ContactTraceHeader", "pulse_shape"):
             header.pulse_shape = contact_pb2.PULSE_SHAPE_GAUSSIAN
-        steps = [contact_pb2.ContactStep(time_s=blow.time_s, impulses=[blow.message()]) for blow in blows]
+        steps = [contact_pb2.ContactStep(time_s=blow.time_s, contacts=[blow.message()]) for blow in blows]
         trace, out = self.daemon.folder / "trace.contacts", self.daemon.folder / "trace.wav"
         write_trace(trace, header, [heard.message()], steps)
         summary = json.loads(self.command("--json", "render", trace, "--out", out, "--sample-rate", sound.RATE,

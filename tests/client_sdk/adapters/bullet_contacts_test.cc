@@ -56,11 +56,11 @@ TEST_F(BulletContactsTest, AContactOfTwoObjectsIsOneRowWithASecondObject) {
   contacts_.AddObject(left_, 9);
   Simulate();
   ASSERT_GT(step_.contacts_size(), 0);
-  for (const v1::EngineContact& contact : step_.contacts()) {
+  for (const v1::Contact& contact : step_.contacts()) {
     EXPECT_EQ(contact.object(), 4U);
     EXPECT_EQ(contact.second().object(), 9U);
   }
-  const v1::EngineContact& contact = step_.contacts(0);
+  const v1::Contact& contact = step_.contacts(0);
   // In the frame of the right ball, x of the world is -y.
   EXPECT_GT(contact.impulse_newton_seconds().y(), -2);
   EXPECT_LT(contact.impulse_newton_seconds().y(), -1e-3);
@@ -81,7 +81,7 @@ TEST_F(BulletContactsTest, ImpulsesAreTheChangeOfMomentumWithFrictionInTheFrameO
   for (int i = 0; i < 10; ++i) {
     step_.Clear();
     world_.stepSimulation(0.001F, 0);
-    for (const v1::EngineContact& contact : step_.contacts()) {
+    for (const v1::Contact& contact : step_.contacts()) {
       EXPECT_FALSE(contact.has_second());
       const v1::Vec3& impulse = contact.impulse_newton_seconds();
       sum +=
@@ -100,11 +100,12 @@ TEST_F(BulletContactsTest, PosesAreThoseOfTheBodies) {
   Simulate();
   v1::ContactStep step;
   contacts_.ReadPoses(step);
-  ASSERT_EQ(step.poses_size(), 2);
-  for (const v1::ObjectPose& pose : step.poses()) {
-    const btRigidBody& body = pose.object() == 4 ? right_ : left_;
-    EXPECT_EQ(pose.pose().position_m().x(), body.getWorldTransform().getOrigin().x());
-    EXPECT_EQ(pose.pose().orientation().z(), body.getWorldTransform().getRotation().z());
+  const v1::PoseColumns& poses = step.poses();
+  ASSERT_EQ(poses.object_size(), 2);
+  for (int i = 0; i < 2; ++i) {
+    const btTransform& place = (poses.object(i) == 4 ? right_ : left_).getWorldTransform();
+    EXPECT_EQ(poses.position_m(3 * i), place.getOrigin().x());
+    EXPECT_EQ(poses.orientation(4 * i + 3), static_cast<float>(place.getRotation().z()));
   }
 }
 

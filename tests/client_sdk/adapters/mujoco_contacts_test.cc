@@ -69,7 +69,7 @@ TEST_F(MujocoContactsTest, AContactOfTwoObjectsIsOneRowWithASecondObject) {
   contacts_.AddObject(1, 9);
   Simulate();
   ASSERT_GT(step_.contacts_size(), 0);
-  const v1::EngineContact& contact = step_.contacts(0);
+  const v1::Contact& contact = step_.contacts(0);
   EXPECT_EQ(contact.object(), 4U);
   EXPECT_EQ(contact.second().object(), 9U);
   EXPECT_NEAR(contact.point_m().y(), kRadiusM, 0.001);  // as deep as they are in one another
@@ -81,7 +81,7 @@ TEST_F(MujocoContactsTest, ImpulsesAddUpToTheChangeOfMomentum) {
   contacts_.AddObject(2, 4);
   Simulate();
   double sum = 0;
-  for (const v1::EngineContact& contact : step_.contacts()) {
+  for (const v1::Contact& contact : step_.contacts()) {
     EXPECT_NEAR(contact.impulse_newton_seconds().x(), 0, 1e-6);
     EXPECT_FALSE(contact.has_second());
     EXPECT_EQ(contact.hertz().striker_mass_kg(), 1);
@@ -96,10 +96,10 @@ TEST_F(MujocoContactsTest, PosesAreThoseOfTheBodies) {
   contacts_.AddObject(2, 4);
   mj_step(model_, data_);
   contacts_.ReadPoses(*data_, step_);
-  ASSERT_EQ(step_.poses_size(), 1);
-  EXPECT_EQ(step_.poses(0).object(), 4U);
-  EXPECT_DOUBLE_EQ(step_.poses(0).pose().position_m().x(), 0.11);
-  EXPECT_NEAR(step_.poses(0).pose().orientation().z(), std::numbers::sqrt2 / 2, 1e-6);
+  ASSERT_EQ(step_.poses().object_size(), 1);
+  EXPECT_EQ(step_.poses().object(0), 4U);
+  EXPECT_DOUBLE_EQ(step_.poses().position_m(0), 0.11);
+  EXPECT_NEAR(step_.poses().orientation(3), std::numbers::sqrt2 / 2, 1e-6);
 }
 
 }  // namespace

@@ -99,12 +99,12 @@ TEST_P(OdePair, AContactOfTwoObjectsIsOneRowWithASecondObject) {
   Hear();
   Simulate();
   ASSERT_GT(step_.contacts_size(), 0);
-  for (const v1::EngineContact& contact : step_.contacts()) {
+  for (const v1::Contact& contact : step_.contacts()) {
     EXPECT_EQ(contact.object(), 4U);
     EXPECT_EQ(contact.second().object(), 9U);
     EXPECT_EQ(contact.partner(), step_.contacts(0).partner());
   }
-  const v1::EngineContact& contact = step_.contacts(0);
+  const v1::Contact& contact = step_.contacts(0);
   EXPECT_NEAR(contact.point_m().y(), kRadiusM, 0.002);  // as deep as they are in one another
   EXPECT_NEAR(contact.second().point_m().x(), kRadiusM, 0.002);
   // Back from the turned frame: -y is x again.
@@ -116,7 +116,7 @@ TEST_P(OdePair, ImpulsesAreTheChangeOfMomentumOfBoth) {
   Hear();
   Simulate();
   double sum = 0;
-  for (const v1::EngineContact& contact : step_.contacts()) {
+  for (const v1::Contact& contact : step_.contacts()) {
     const v1::Vec3& impulse = contact.impulse_newton_seconds();
     EXPECT_NEAR(impulse.x(), 0, 1e-12);
     sum -= impulse.y();
@@ -131,7 +131,7 @@ TEST_P(OdePair, WhereOneIsHeardThereIsNoSecondObject) {
   contacts_.AddObject(left_, 9);
   Simulate();
   ASSERT_GT(step_.contacts_size(), 0);
-  const v1::EngineContact& contact = step_.contacts(0);
+  const v1::Contact& contact = step_.contacts(0);
   EXPECT_EQ(contact.object(), 9U);
   EXPECT_FALSE(contact.has_second());
   EXPECT_LT(contact.impulse_newton_seconds().x(), -0.5);
@@ -142,7 +142,7 @@ TEST_P(OdePair, AWallThatIsNoBodyIsNoSecondObject) {
   AddWall(2 * kRadiusM + 0.001 + kRadiusM - 0.0005);  // the right ball touches it
   Simulate();
   double sum = 0;
-  for (const v1::EngineContact& contact : step_.contacts()) {
+  for (const v1::Contact& contact : step_.contacts()) {
     if (contact.has_second()) continue;
     EXPECT_EQ(contact.object(), 4U);
     sum -= contact.impulse_newton_seconds().y();
@@ -157,11 +157,12 @@ TEST_P(OdePair, PosesAreThoseOfTheBodies) {
   Simulate();
   v1::ContactStep step;
   contacts_.ReadPoses(step);
-  ASSERT_EQ(step.poses_size(), 2);
-  for (const v1::ObjectPose& pose : step.poses()) {
-    const dBodyID body = pose.object() == 4 ? right_ : left_;
-    EXPECT_EQ(pose.pose().position_m().x(), dBodyGetPosition(body)[0]);
-    EXPECT_EQ(pose.pose().orientation().z(), dBodyGetQuaternion(body)[3]);
+  const v1::PoseColumns& poses = step.poses();
+  ASSERT_EQ(poses.object_size(), 2);
+  for (int i = 0; i < 2; ++i) {
+    const dBodyID body = poses.object(i) == 4 ? right_ : left_;
+    EXPECT_EQ(poses.position_m(3 * i), dBodyGetPosition(body)[0]);
+    EXPECT_EQ(poses.orientation(4 * i + 3), static_cast<float>(dBodyGetQuaternion(body)[3]));
   }
 }
 

@@ -35,11 +35,9 @@ class SlowService final : public v1::ContactService::Service {
     stream->Write(answer);
     may_read.WaitForNotification();
     while (stream->Read(&request)) {
-      const bool alone = request.has_step();
       message_sizes.push_back(request.ByteSizeLong());
-      step_counts.push_back(alone ? 1 : request.steps().steps_size());
-      if (alone) times_s.push_back(request.step().time_s());
-      for (const v1::ContactStep& step : request.steps().steps()) times_s.push_back(step.time_s());
+      step_counts.push_back(request.steps_size());
+      for (const v1::ContactStep& step : request.steps()) times_s.push_back(step.time_s());
     }
     answer.set_step_count(times_s.size());
     stream->Write(answer);
@@ -66,12 +64,12 @@ class ContactStreamCallTest : public testing::Test {
     stream_ = *client_->StreamContacts(start);
   }
 
-  /// Sends `count` steps of `impulse_count` impulses each, 10 ms apart.
-  void Send(int count, int impulse_count) {
+  /// Sends `count` steps of `contact_count` contacts each, 10 ms apart.
+  void Send(int count, int contact_count) {
     for (int i = 0; i < count; ++i) {
       v1::ContactStep step;
       step.set_time_s(0.01 * sent_count_++);
-      for (int k = 0; k < impulse_count; ++k) step.add_impulses()->set_object(7);
+      for (int k = 0; k < contact_count; ++k) step.add_contacts()->set_object(7);
       ASSERT_TRUE(stream_->Send(std::move(step)).ok());
     }
   }

@@ -34,7 +34,7 @@ class ContactTrace : public testing::Test {
     v1::ContactStep step;
     step.set_time_s(0.25);
     // More than 127 bytes, so that its length takes two.
-    for (int i = 0; i < 20; ++i) step.add_impulses()->set_object(7);
+    for (int i = 0; i < 20; ++i) step.add_contacts()->set_object(7);
     ASSERT_TRUE(writer->Write(step).ok());
     ASSERT_TRUE(writer->Close().ok());
   }
@@ -76,7 +76,7 @@ TEST_F(ContactTrace, ReadsBackWhatWasWritten) {
   const auto step = reader->Next();
   ASSERT_TRUE(step.ok() && *step);
   EXPECT_EQ((*step)->step().time_s(), 0.25);
-  EXPECT_EQ((*step)->step().impulses_size(), 20);
+  EXPECT_EQ((*step)->step().contacts_size(), 20);
   const auto end = reader->Next();
   ASSERT_TRUE(end.ok());
   EXPECT_FALSE(*end);

@@ -27,8 +27,10 @@ absl::Status PlayBounces(const Client& daemon, const std::string& scene, uint32_
   if (!contacts.ok()) return contacts.status();
   for (double impulse = 0.4; impulse > 0.1; impulse /= 2) {
     v1::ContactStep step;
-    step.add_impulses()->set_object(ball);
-    step.mutable_impulses(0)->mutable_impulse_newton_seconds()->set_z(impulse);
+    v1::Contact& impact = *step.add_contacts();
+    impact.set_kind(v1::CONTACT_KIND_IMPACT);
+    impact.set_object(ball);
+    impact.mutable_impulse_newton_seconds()->set_z(impulse);
     if (absl::Status sent = (*contacts)->Send(std::move(step)); !sent.ok()) return sent;
   }
   return (*contacts)->Finish().status();
@@ -48,7 +50,7 @@ class MockContactStream : public ContactStream {
 };
 
 double ImpulseOf(const v1::ContactStep& step) {
-  return step.impulses(0).impulse_newton_seconds().z();
+  return step.contacts(0).impulse_newton_seconds().z();
 }
 
 TEST(UsersCode, CanBeTestedWithAMockOfTheClient) {

@@ -79,7 +79,7 @@ class FakeClient final : public Client {
  public:
   explicit FakeClient(FakeDaemon& daemon) : daemon_(daemon) {}
 
-  absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
+  absl::StatusOr<v1::CreateSceneResponse> CreateScene(
       const v1::CreateSceneRequest& request) const override {
     const absl::MutexLock lock(&daemon_.mutex);
     if (!daemon_.reachable) return Gone();
@@ -103,7 +103,7 @@ class FakeClient final : public Client {
   absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
       const v1::AddObjectsRequest& request) const override {
     const absl::MutexLock lock(&daemon_.mutex);
-    for (const v1::AddObjectRequest& object : request.objects()) {
+    for (const v1::NewObject& object : request.objects()) {
       daemon_.scenes[request.scene().substr(7)][object.handle()] = object.modal_model();
     }
     return std::vector<v1::SoundingObject>();

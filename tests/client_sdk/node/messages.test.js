@@ -66,9 +66,9 @@ test('warnings of the daemon are told by their ids, and steps that were not sent
 
 test('an object of another scene is refused', async () => {
   const stream = new carillon.Scene(c, 'scenes/2').stream({ step: 1 / 240 });
-  for (const impulses of [[{ object: bell, point: POINT, impulse: IMPULSE }],
+  for (const impacts of [[{ object: bell, point: POINT, impulse: IMPULSE }],
     { objects: [1, bell], points: [0, 0, 0, 0, 0, 0], impulses: [0, 0, 1, 0, 0, 1] }]) {
-    assert.throws(() => stream.step(0, { impulses }), /object of scenes\/1, and this is a stream of scenes\/2/);
+    assert.throws(() => stream.step(0, { impacts }), /object of scenes\/1, and this is a stream of scenes\/2/);
   }
   await assert.rejects(stream.close(), carillon.ServerUnavailable);
 });
@@ -169,7 +169,7 @@ test('what is no object where keys are wanted is refused', async () => {
     [() => scene.add('modalModels/1', 'oak'), "add is given 'oak'; give an object, such as { material: ... }"],
     [async () => new carillon.Trace().add('modalModels/1', 'oak'), "add is given 'oak'; give an object"],
     [() => bell.update('louder'), "update is given 'louder'; give an object, such as { material: ... }"],
-    [async () => new carillon.Trace().step(0, { impulses: [7] }), 'impulses[0] is given 7']]) {
+    [async () => new carillon.Trace().step(0, { impacts: [7] }), 'impacts[0] is given 7']]) {
     await assert.rejects(call, (error) => error.message.includes(wanted) || assert.fail(error.message));
   }
 });
@@ -178,8 +178,8 @@ test('contacts are refused by their names, with unit and frame', async () => {
   const own = "in the stream's frame, which is each object's own unless it was opened with frame: 'scene'";
   refused(`point of contacts[1] is [ 0, 0 ]; it must be [x, y, z]: metres ${own}`,
     { contacts: [{ object: 1, point: POINT, impulse: IMPULSE }, { object: 1, point: [0, 0], impulse: IMPULSE }] });
-  refused(`impulse of impulses[0] is undefined; it must be [x, y, z]: newton seconds ${own}`,
-    { impulses: [{ object: 1, point: POINT }] });
+  refused(`impulse of impacts[0] is undefined; it must be [x, y, z]: newton seconds ${own}`,
+    { impacts: [{ object: 1, point: POINT }] });
   refused('object of contacts[0] is undefined', { contacts: [{ point: POINT, impulse: IMPULSE }] });
   refused(`points has 2 numbers; it must have 3 a contact: metres ${own}`,
     { contacts: { objects: 1, points: [0, 0], impulses: IMPULSE } });
@@ -194,7 +194,7 @@ test('contacts are refused by their names, with unit and frame', async () => {
 test('a strike without an impulse is refused, because it would be silent', async () => {
   await assert.rejects(bell.strike({ point: POINT, impulse: [0, 0, 0] }),
     /impulse is \[ 0, 0, 0 \]; it must be other than zero, because the strike would be silent/);
-  new carillon.Trace().step(0, { impulses: { objects: 1, points: POINT, impulses: [0, 0, 0] } });
+  new carillon.Trace().step(0, { impacts: { objects: 1, points: POINT, impulses: [0, 0, 0] } });
 });
 
 test('a message about a job that waits says why', () => {
@@ -212,10 +212,10 @@ test('handles and partners that are no whole numbers of 32 bits are refused', ()
     const row = { object: 1, point: POINT, impulse: IMPULSE };
     const object = 'it must be an object that scene.add or trace.add returned, or its handle, a whole number';
     const partner = 'it must be a whole number from 0 to 4294967295 that names the other body';
-    refused(`object of impulses[0] is ${shown}; ${object}`, { impulses: [{ ...row, object: wrong }] });
+    refused(`object of impacts[0] is ${shown}; ${object}`, { impacts: [{ ...row, object: wrong }] });
     refused(`partner of contacts[0] is ${shown}; ${partner}`, { contacts: [{ ...row, partner: wrong }] });
     const columns = { objects: 1, points: POINT, impulses: IMPULSE };
-    refused(`an entry of objects is ${shown}; ${object}`, { impulses: { ...columns, objects: [wrong] } });
+    refused(`an entry of objects is ${shown}; ${object}`, { impacts: { ...columns, objects: [wrong] } });
     for (const partners of [wrong, [wrong]]) {
       refused(`an entry of partners is ${shown}; ${partner}`, { contacts: { ...columns, partners } });
     }
@@ -226,21 +226,21 @@ test('handles and partners that are no whole numbers of 32 bits are refused', ()
 test('a negative duration is refused, and an undefined one is left to the daemon', async () => {
   const wanted = 'it must be zero seconds or more, or NaN, which leaves it to the daemon';
   const columns = { objects: 1, points: POINT, impulses: IMPULSE };
-  refused(`an entry of durations is -5; ${wanted}`, { impulses: { ...columns, durations: -5 } });
-  refused(`duration of impulses[0] is -5; ${wanted}`, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE,
+  refused(`an entry of durations is -5; ${wanted}`, { impacts: { ...columns, durations: -5 } });
+  refused(`duration of impacts[0] is -5; ${wanted}`, { impacts: [{ object: 1, point: POINT, impulse: IMPULSE,
     duration: -5 }] });
   await assert.rejects(bell.strike({ point: POINT, impulse: IMPULSE, duration: -5 }), /duration is -5; it must be zero/);
   const trace = new carillon.Trace();
-  trace.step(0, { impulses: { ...columns, durations: NaN } });
-  trace.step(0, { impulses: [{ object: 1, point: POINT, impulse: IMPULSE, duration: NaN }] });
-  assert.deepEqual(trace.steps[0].columns.duration_s, [-1]);
-  assert.equal('duration_s' in trace.steps[1].impulses[0], false);
+  trace.step(0, { impacts: { ...columns, durations: NaN } });
+  trace.step(0, { impacts: [{ object: 1, point: POINT, impulse: IMPULSE, duration: NaN }] });
+  assert.deepEqual(trace.steps[0].contact_columns[0].duration_s, [-1]);
+  assert.equal('duration_s' in trace.steps[1].contacts[0], false);
 });
 
 test('a trace of contacts needs the length of its steps, as a stream does', () => {
   const contacts = [{ object: 1, point: POINT, impulse: IMPULSE }];
   assert.throws(() => new carillon.Trace().step(0, { contacts }), /new Trace\(\{ step: 1 \/ 240 \}\)/);
-  new carillon.Trace().step(0, { impulses: contacts });
+  new carillon.Trace().step(0, { impacts: contacts });
   new carillon.Trace({ step: 1 / 240 }).step(0, { contacts });
 });
 
@@ -311,7 +311,7 @@ test('text in place of a number is refused with the name of the field', async ()
     ['step of stream', () => scene.stream({ step: text })],
     ['delay of stream', () => scene.stream({ step: 0.01, delay: text })],
     ['step of Trace', () => new carillon.Trace({ step: text })],
-    ['timeOffset of impulses[0]', () => trace.step(0, { impulses: [{ ...row, timeOffset: text }] })],
+    ['timeOffset of impacts[0]', () => trace.step(0, { impacts: [{ ...row, timeOffset: text }] })],
     ['roughnessDepth of contacts', () => trace.step(0, { contacts: { objects: 1, points: POINT, impulses: IMPULSE,
       roughnessDepth: text } })],
     ['seconds of renderStrike', () => new carillon.Model(c, { name: 'modalModels/1' }).renderStrike({ point: POINT,

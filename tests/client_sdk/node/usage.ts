@@ -28,7 +28,7 @@ async function main(): Promise<void> {
   const stream = scene.stream({ step: 1 / 240, delay: 0.05, frame: 'scene' });
   await stream.step(0, {
     contacts: { objects: bell, points: new Float32Array(6), impulses: new Float32Array(6), partners: [1, 2] },
-    impulses: [{ object: 3, point: [0, 0, 0], impulse: [0, 0, 1], second: { object: bell, point: [0, 0, 0] } }],
+    impacts: [{ object: 3, point: [0, 0, 0], impulse: [0, 0, 1], second: { object: bell, point: [0, 0, 0] } }],
     poses: { objects: [3], positions: [[0, 0, 0]] },
   });
   const late: number = (await stream.close(false)).late_count + stream.lateCount + stream.remapCount;

@@ -87,8 +87,8 @@ class RefusalsTest(MessagesTest):
                                             scene_service_pb2.SoundingObject(handle=1)) for i in (1, 2))
         point, impulse = [[0, 0, 0]], [[0, 0, 1]]
         check = carillon.streams._refuse_other_scenes
-        check(carillon.Impulses([one], point, impulse, second_objects=[3]), "scenes/1")
-        for columns in (carillon.Impulses(two, point, impulse), carillon.Impulses([1], point, impulse,
+        check(carillon.Impacts([one], point, impulse, second_objects=[3]), "scenes/1")
+        for columns in (carillon.Impacts(two, point, impulse), carillon.Impacts([1], point, impulse,
                                                                                   second_objects=[two])):
             self.refused("an object of scenes/2, and this is a stream of scenes/1", check, columns, "scenes/1")
 
@@ -167,21 +167,21 @@ class RefusalsTest(MessagesTest):
                              (numpy.nan, "nan"), ([1, 2**40], str(2**40))):
             points = [POINT] * numpy.size(wrong)
             self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned",
-                         made, impulses=carillon.Impulses(wrong, points, points))
+                         made, impacts=carillon.Impacts(wrong, points, points))
             self.refused(f"an entry of partners is {shown}; it must be a whole number from 0 to 4294967295 that names",
                          made, contacts=carillon.Contacts(1, points, points, partners=wrong))
         step = made(contacts=carillon.Contacts(numpy.array([3.0]), POINT, IMPULSE, partners=2**32 - 1))
-        self.assertEqual(list(step.contact_columns.impulses.object), [3])
-        self.assertEqual(list(step.contact_columns.partner), [2**32 - 1])
+        self.assertEqual(list(step.contact_columns[0].object), [3])
+        self.assertEqual(list(step.contact_columns[0].partner), [2**32 - 1])
         self.refused("handle of add is -1; it must be a whole number", carillon.Trace().add, "modalModels/1", handle=-1)
 
     def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
         self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
-                     "daemon", made, impulses=carillon.Impulses(1, POINT, IMPULSE, durations=[-5]))
+                     "daemon", made, impacts=carillon.Impacts(1, POINT, IMPULSE, durations=[-5]))
         bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
         self.refused("duration is -5; it must be zero seconds or more", bell.strike, POINT, IMPULSE, -5)
-        step = made(impulses=carillon.Impulses(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
-        self.assertEqual(list(step.columns.duration_s), [-1, 0])
+        step = made(impacts=carillon.Impacts(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
+        self.assertEqual(list(step.contact_columns[0].duration_s), [-1, 0])
 
     def test_a_strike_is_refused_by_its_own_names(self):
         scene = carillon.Scene(self.c, "scenes/1")
@@ -197,12 +197,12 @@ class RefusalsTest(MessagesTest):
         for strike in (bell.strike, carillon.Model(self.c, summary, "oak").render_strike):
             self.refused("impulse is (0, 0, 0); it must be other than zero, because the strike would be silent",
                          strike, POINT, (0, 0, 0))
-        made(impulses=carillon.Impulses(1, POINT, (0, 0, 0)))
+        made(impacts=carillon.Impacts(1, POINT, (0, 0, 0)))
 
     def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
-        contacts, impulses = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impulses))
+        contacts, impacts = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impacts))
         self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
-        carillon.Trace().step(0, impulses=impulses)
+        carillon.Trace().step(0, impacts=impacts)
         carillon.Trace(step=1 / 240).step(0, contacts=contacts)
 
     def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_and_the_trace_can_be_continued(self):

@@ -35,8 +35,8 @@ class StreamTest(unittest.TestCase):
         client.contacts_stub = stub
         stream = carillon.ContactStream(client, START)
         for number, count in enumerate(row_counts):
-            row = contact_pb2.Impulse(object=1, duration_s=1e-3)
-            stream.send(contact_pb2.ContactStep(time_s=0.01 * number, impulses=[row] * count))
+            row = contact_pb2.Contact(kind=contact_pb2.CONTACT_KIND_IMPACT, object=1, duration_s=1e-3)
+            stream.send(contact_pb2.ContactStep(time_s=0.01 * number, contacts=[row] * count))
         stream.close(warn=False)
         requests = list(stub.requests)
         self.assertEqual(requests.pop(0).start, START)
@@ -67,24 +67,24 @@ class StreamTest(unittest.TestCase):
             self.assertEqual(str(raised.exception), f"time is {wrong!r}; it must be the simulation time in seconds")
         stream.step(3)
         stream.close(warn=False)
-        steps = [step for request in stub.requests for step in request.steps.steps]
+        steps = [step for request in stub.requests for step in request.steps]
         self.assertEqual([step.time_s for step in steps], [-1, 2, 2, 3])
 
     def test_small_steps_that_wait_are_sent_together_and_in_order(self):
         requests = self.requests_of([1] * 1000)
-        times = [step.time_s for request in requests for step in request.steps.steps]
+        times = [step.time_s for request in requests for step in request.steps]
         self.assertEqual(times, [0.01 * number for number in range(1000)])
-        self.assertEqual([len(request.steps.steps) for request in requests], [256, 256, 256, 232])
+        self.assertEqual([len(request.steps) for request in requests], [256, 256, 256, 232])
 
     def test_a_step_that_does_not_fit_comes_in_the_next_message(self):
         requests = self.requests_of([1, 100_000, 1, 1])
-        self.assertEqual([request.WhichOneof("request") for request in requests], ["step", "step", "steps"])
+        self.assertEqual([len(request.steps) for request in requests], [1, 1, 2])
         self.assertLess(max(request.ByteSize() for request in requests), 2 << 20)
-        self.assertEqual(len(requests[1].step.impulses), 100_000)
+        self.assertEqual(len(requests[1].steps[0].contacts), 100_000)
 
     def test_a_stream_of_one_step_or_none_ends(self):
         self.assertEqual(self.requests_of([]), [])
-        self.assertEqual([request.WhichOneof("request") for request in self.requests_of([3])], ["step"])
+        self.assertEqual([len(request.steps) for request in self.requests_of([3])], [1])
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   const auto client = carillon::client::Connect(argv[1]);
   carillon::client::SceneRegistration lathe;
   lathe.scene.set_id("lathe");
-  carillon::v1::AddObjectRequest& bar = lathe.objects.emplace_back();
+  carillon::v1::NewObject& bar = lathe.objects.emplace_back();
   bar.set_handle(5);
   bar.set_modal_model(argv[2]);
   carillon::v1::ContactStreamStart start;
@@ -30,7 +30,8 @@ int main(int argc, char** argv) {
   for (int step_number = 0; poll(&input, 1, 10) == 0; ++step_number) {
     carillon::v1::ContactStep step;
     step.set_time_s(0.01 * step_number);
-    carillon::v1::Impulse& strike = *step.add_impulses();
+    carillon::v1::Contact& strike = *step.add_contacts();
+    strike.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
     strike.set_object(5);
     strike.mutable_point_m();
     strike.mutable_impulse_newton_seconds()->set_z(0.001);

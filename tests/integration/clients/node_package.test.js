@@ -96,7 +96,7 @@ test('mistakes with models and files are told, and a model is found by its label
   trace.add(model);
   await withScene(async (scene) => {
     const bar = await scene.add(model);
-    assert.throws(() => trace.step(0, { impulses: [{ object: bar, ...STRIKE }] }), /which is not in the trace/);
+    assert.throws(() => trace.step(0, { impacts: [{ object: bar, ...STRIKE }] }), /which is not in the trace/);
   });
   await assert.rejects(new carillon.Sound(new Float32Array(1), 48000, 1).save('x.mp3'), /must end with .wav/);
   assert.throws(() => carillon.connect('/run/carillond.sock'), /"unix:PATH" or "HOST:PORT"/);
@@ -192,11 +192,11 @@ test('contacts in rows sound as the same in columns', async () => {
 });
 
 test('points in the frame of the scene are turned into that of the object', async () => {
-  const own = await rendered([[0, { impulses: [{ object: 1, ...STRIKE }] }]]);
+  const own = await rendered([[0, { impacts: [{ object: 1, ...STRIKE }] }]]);
   const half = Math.SQRT1_2; // a quarter turn about z: x of the object is y of the scene
   const [x, y, z] = POINT;
   const turned = { object: 1, ...STRIKE, point: [1 - y, 2 + x, 3 + z] };
-  const scene = await rendered([[0, { impulses: [turned] }]], { frame: 'scene',
+  const scene = await rendered([[0, { impacts: [turned] }]], { frame: 'scene',
     poses: [{ position: [1, 2, 3], orientation: [half, 0, 0, half] }] });
   assert.ok(own.samples.every((sample, i) => Math.abs(sample - scene.samples[i]) < 1e-5 * own.peak));
 });
@@ -211,8 +211,8 @@ test('a stream counts, and tells what was wrong', async () => {
         poses: { objects: bars, positions: [[i, 0, 0], [i, 1, 0]] },
       });
     }
-    await stream.step(0.1, { impulses: [{ object: bars[0], point: POINT, impulse: [0, 0, -1e9] }] });
-    await stream.step(0.1, { impulses: [{ object: bars[0], point: [0, 0, 1], impulse: IMPULSE }] });
+    await stream.step(0.1, { impacts: [{ object: bars[0], point: POINT, impulse: [0, 0, -1e9] }] });
+    await stream.step(0.1, { impacts: [{ object: bars[0], point: [0, 0, 1], impulse: IMPULSE }] });
     const report = await stream.close();
     assert.equal(report.step_count, 26);
     assert.equal(report.rejected_count, 1);
@@ -239,7 +239,7 @@ test('contacts that come late are told once', async () => withScene(async (scene
   const stream = scene.stream({ step: 1 / 240, delay: 0 });
   await stream.step(0);
   await (await c.listen()).take(0.1);
-  await stream.step(0, { impulses: [{ object: 1, ...STRIKE }] });
+  await stream.step(0, { impacts: [{ object: 1, ...STRIKE }] });
   await stream.close();
   await new Promise(setImmediate);
   process.off('warning', listener);
@@ -286,7 +286,7 @@ test('more renderings than a client may have wait', async () => {
 test('a trace is written and read, and a damaged one is refused', async () => {
   const trace = new carillon.Trace({ step: 1 / 60, simulator: 'test' });
   trace.add(model);
-  trace.step(0, { impulses: [{ object: 1, ...STRIKE }] });
+  trace.step(0, { impacts: [{ object: 1, ...STRIKE }] });
   const file = path.join(FOLDER, 'node.contacts');
   await trace.write(file);
   const [one, other] = [await c.render(trace, { tail_s: 0.2 }), await c.render(file, { tail_s: 0.2 })];
@@ -360,7 +360,7 @@ test('a stream that is being closed ends though its client is closed', async () 
   const scene = await c.createScene();
   const bar = await scene.add(model);
   const stream = new carillon.Scene(own, scene.name).stream({ step: 1 / 60 });
-  await stream.step(0, { impulses: [{ object: bar.handle, ...STRIKE }] });
+  await stream.step(0, { impacts: [{ object: bar.handle, ...STRIKE }] });
   const closed = stream.close();
   own.close();
   assert.equal(Number((await closed).step_count), 1);

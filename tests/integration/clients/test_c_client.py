@@ -35,8 +35,17 @@ class Object(ctypes.Structure):
                 ("gain", ctypes.c_double), ("handle", ctypes.c_uint32)]
 
 
-class Impulse(ctypes.Structure):
-    _fields_ = [("object", ctypes.c_uint32), ("point_m", Vec3), ("impulse", Vec3), ("duration_s", ctypes.c_double)]
+class Contact(ctypes.Structure):
+    _fields_ = [("kind", ctypes.c_int32), ("object", ctypes.c_uint32), ("point_m", Vec3), ("impulse", Vec3),
+                ("force", Vec3), ("partner", ctypes.c_uint32), ("duration_s", ctypes.c_double),
+                ("travel_speed_m_per_s", ctypes.c_double), ("roughness_depth", ctypes.c_double)]
+
+
+IMPACT, FORCE = 1, 2
+
+
+def impact(handle, point, impulse, duration_s=0.0):
+    return Contact(IMPACT, handle, point, impulse, duration_s=duration_s)
 
 
 class Quaternion(ctypes.Structure):
@@ -48,8 +57,7 @@ class Pose(ctypes.Structure):
 
 
 class Step(ctypes.Structure):
-    _fields_ = [("time_s", ctypes.c_double), ("contacts", ctypes.c_void_p), ("contact_count", ctypes.c_size_t),
-                ("impulses", ctypes.POINTER(Impulse)), ("impulse_count", ctypes.c_size_t),
+    _fields_ = [("time_s", ctypes.c_double), ("contacts", ctypes.POINTER(Contact)), ("contact_count", ctypes.c_size_t),
                 ("poses", ctypes.POINTER(Pose)), ("pose_count", ctypes.c_size_t), ("listener", ctypes.POINTER(Pose))]
 
 
@@ -137,12 +145,12 @@ class CClientTest(DaemonTest):
         bar = Object(model.encode(), meshes.MATERIAL.encode())
         self.assertEqual(self.c.carillon_add_object(scene, ctypes.byref(bar), ctypes.byref(handle)), 0)
 
-        def warnings_of(*impulses):
+        def warnings_of(*impacts):
             self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
-            rows = (Impulse * len(impulses))(*impulses)
-            step = Step(impulses=rows, impulse_count=len(rows))
+            rows = (Contact * len(impacts))(*impacts)
+            step = Step(contacts=rows, contact_count=len(rows))
             self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
-            for name in ("contact_count", "impulse_count", "pose_count"):
+            for name in ("contact_count", "pose_count"):
                 empty = Step(**{name: 3})
                 self.assertEqual(self.c.carillon_send(stream, ctypes.byref(empty)), 3)
                 self.assertRegex(self.c.carillon_error(), b"^INVALID_SETTINGS: an array of the step is a null pointer")
@@ -150,10 +158,17 @@ class CClientTest(DaemonTest):
             return self.c.carillon_warnings().decode().splitlines()
 
         point, blow = Vec3(0.1, 0.015, 0.01), Vec3(0, 0, -1e-3)
-        self.assertEqual(warnings_of(Impulse(handle, point, blow)), [])
-        far, lost = warnings_of(Impulse(99, point, blow), Impulse(handle, Vec3(100, 15, 10), blow))[::-1]
+        self.assertEqual(warnings_of(impact(handle, point, blow)), [])
+        far, lost = warnings_of(impact(99, point, blow), impact(handle, Vec3(100, 15, 10), blow))[::-1]
         self.assertRegex(far, "^POINTS_DISTANT: ")
         self.assertRegex(lost, "^CONTACTS_REJECTED: .* OBJECT_NOT_FOUND: ")
+        for wrong in (Contact(3, handle, point, blow), Contact(IMPACT, handle, point, Vec3(), blow),
+                      Contact(0, handle, point, blow, blow), Contact(FORCE, handle, point, blow)):
+            self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
+            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(Step(contacts=ctypes.pointer(wrong),
+                                                                            contact_count=1))), 3)
+            self.assertRegex(self.c.carillon_error(), b"^INVALID_SETTINGS: .* contact")
+            self.assertEqual(self.c.carillon_close_stream(stream, None), 0)
         for step_s in (0, -1, 10, float("nan")):
             self.assertEqual(self.c.carillon_create_trace(b"x.contacts", step_s, 0, None, ctypes.byref(stream)), 3)
             self.assertRegex(self.c.carillon_error(), b"^INVALID_STREAM: step_s is .* from 1e-6 to 1 s")
@@ -167,8 +182,8 @@ class CClientTest(DaemonTest):
         self.assertEqual(self.c.carillon_register_scene(self.connection, ctypes.byref(registration),
                                                         ctypes.byref(lasting)), 0)
         self.addCleanup(self.c.carillon_delete_scene, lasting)
-        many = (Impulse * 100_000)(*(Impulse(1, Vec3(1, 1, 1), Vec3(1, 1, 1)) for _ in range(100_000)))
-        step = Step(impulses=many, impulse_count=len(many))
+        many = (Contact * 100_000)(*(impact(1, Vec3(1, 1, 1), Vec3(1, 1, 1)) for _ in range(100_000)))
+        step = Step(contacts=many, contact_count=len(many))
         for struck in (scene, lasting):
             self.assertEqual(self.c.carillon_open_stream(struck, 1 / 60, 0, ctypes.byref(stream)), 0)
             self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 3)
@@ -219,8 +234,8 @@ class CClientTest(DaemonTest):
 
     def test_a_trace_renders_to_the_samples_that_python_gets(self):
         def steps(handle):
-            blow = Impulse(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-            return [Step(0.0, None, 0, ctypes.pointer(blow), 1, None, 0)]
+            blow = impact(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+            return [Step(0.0, ctypes.pointer(blow), 1)]
 
         file = str(self.folder / "c.contacts")
         model = self.write_trace(file, steps)
@@ -261,8 +276,8 @@ class CClientTest(DaemonTest):
         at = Vec3(2, 0, 1)
 
         def blow(handle, point, listener=None):
-            pose, impulse = Pose(handle, at), Impulse(handle, point, Vec3(0, 0, -0.01), 1e-4)
-            return [Step(0.0, None, 0, ctypes.pointer(impulse), 1, ctypes.pointer(pose), 1,
+            pose, struck = Pose(handle, at), impact(handle, point, Vec3(0, 0, -0.01), 1e-4)
+            return [Step(0.0, ctypes.pointer(struck), 1, ctypes.pointer(pose), 1,
                          listener and ctypes.pointer(listener))]
 
         hearing = Hearing(distance_gain=1, propagation_delay=1, panning=1, listener=Pose(0, Vec3(0, 0, 1)))
@@ -309,7 +324,7 @@ class CClientTest(DaemonTest):
         self.assertEqual(self.c.carillon_open_stream(scene, 0.01, 0, ctypes.byref(stream)), 0)
         self.daemon.kill()
         self.daemon.start()
-        step = Step(0.0, None, 0, None, 0, None, 0)
+        step = Step(0.0)
         handles, end_s = [], time.monotonic() + 30
         with carillon.connect(self.daemon.server) as c:
             while handles != [5, 9] and time.monotonic() < end_s:
@@ -318,8 +333,8 @@ class CClientTest(DaemonTest):
                 time.sleep(0.01)
                 handles = [item.handle for scene_there in c.scenes() for item in scene_there.objects()]
         self.assertEqual(handles, [5, 9])
-        blow = Impulse(9, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-        step.impulses, step.impulse_count, step.time_s = ctypes.pointer(blow), 1, step.time_s + 0.01
+        blow = impact(9, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+        step.contacts, step.contact_count, step.time_s = ctypes.pointer(blow), 1, step.time_s + 0.01
         report = Report()
         while report.accepted_count + report.late_count == 0 and time.monotonic() < end_s:
             self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)

@@ -57,7 +57,7 @@ class InterchangeTest(DaemonTest):
         body = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=model, material=material,
                                                     size=1, gain=1)
         blow = sound.impulse((0.006, 0.0013, 0.010), (0.0, 0.002, -0.005))
-        step = contact_pb2.ContactStep(time_s=0, impulses=[blow])
+        step = contact_pb2.ContactStep(time_s=0, contacts=[blow])
         samples, summary = sound.render(self.daemon, [body], [step], tail_s)
         self.assertEqual(int(summary["rejected_count"]), 0)
         return samples

@@ -93,7 +93,7 @@ class CallsTest(DaemonTest):
     def test_a_rendering_tells_its_blows(self):
         trace = carillon.Trace(1 / 60)
         bar = trace.add(self.model)
-        trace.step(0.25, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+        trace.step(0.25, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
         self.assertEqual(self.c.render(trace, tail_s=0.1).blows, ())
         blow, = self.c.render(trace, tail_s=0.1, tell_blows=True).blows
         self.assertAlmostEqual(blow.time_s, 0.25)
@@ -104,7 +104,7 @@ class CallsTest(DaemonTest):
         for factor in (1, 1e-5, 1e4):
             trace = carillon.Trace(1 / 60)
             bar = trace.add(self.model)
-            trace.step(0.0, impulses=carillon.Impulses(bar, POINT, numpy.multiply(IMPULSE, factor),
+            trace.step(0.0, impacts=carillon.Impacts(bar, POINT, numpy.multiply(IMPULSE, factor),
                                                        durations=DURATION_S))
             sounds.append(self.c.render(trace, normalize=True, tail_s=0.3))
         for other in sounds[1:]:
@@ -116,7 +116,7 @@ class CallsTest(DaemonTest):
                 # A blow is over one step after it, and then sounds. One after a gap is a blow by itself.
                 ("contacts", lambda number: True, (hit + 1) * step_s),
                 ("contacts", lambda number: number in (0, hit), hit * step_s),
-                ("impulses", lambda number: True, hit * step_s)):
+                ("impacts", lambda number: True, hit * step_s)):
             with self.subTest(kind=kind, blow_s=blow_s):
                 sent = getattr(carillon, kind.capitalize())(1, POINT, IMPULSE, durations=DURATION_S)
                 steps = [(number * step_s, {kind: sent} if number == hit else {})
@@ -160,7 +160,7 @@ class CallsTest(DaemonTest):
                 with scene.stream(step=1 / 240, delay=0) as stream:
                     stream.step(0.0)
                     self.c.listen(0.1)
-                    stream.step(0.0, impulses=carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S))
+                    stream.step(0.0, impacts=carillon.Impacts(1, POINT, IMPULSE, durations=DURATION_S))
         self.assertEqual([(one.message.id, one.message.count, one.message.figures) for one in told.warnings],
                          [("CONTACTS_LATE", 1, {"scheduling_delay_s": 0})])
         self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
@@ -193,7 +193,7 @@ class CallsTest(DaemonTest):
                 await bar.strike(POINT, IMPULSE, DURATION_S)
                 await other.remove()
                 trace = carillon.Trace()
-                trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                trace.step(0.0, impacts=carillon.Impacts(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
                 return ((await job.refresh()).state, await model.frequencies(), (await c.render(trace)).peak,
                         (await model.render_strike(POINT, IMPULSE, duration=DURATION_S)).peak,
                         [item.handle for item in await scene.objects()])
@@ -222,7 +222,7 @@ class CallsTest(DaemonTest):
             async with carillon.aio.connect(self.daemon.server) as c:
                 model = await c.model("bar")
                 trace = carillon.Trace()
-                trace.step(0.0, impulses=carillon.Impulses(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                trace.step(0.0, impacts=carillon.Impacts(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
                 limits = (await c.info()).limits
                 sounds = await asyncio.gather(
                     *(model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=0.1) for _ in range(8)),
@@ -239,7 +239,7 @@ class CallsTest(DaemonTest):
                 self.assertEqual((await scene.update(gain=0.5)).gain, 0.5)
                 async with c.recording() as record, scene.recording_contacts() as contacts:
                     stream = scene.stream(step=1 / 240)
-                    await stream.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+                    await stream.step(0.0, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
                     report = await stream.close()
                     with self.assertRaisesRegex(carillon.CarillonError, "CONTACT_STREAM_ENDED"):
                         await stream.step(1.0)

@@ -63,10 +63,10 @@ class MistakesTest(PackageTest):
             bar = scene.add(self.model)
             for objects in (bar, [bar]):
                 with self.assertRaisesRegex(ValueError, "which is not in the trace; give what Trace.add returned"):
-                    trace.step(0, impulses=carillon.Impulses(objects, [(0, 0, 0)], [(0, 0, -1e-3)]))
+                    trace.step(0, impacts=carillon.Impacts(objects, [(0, 0, 0)], [(0, 0, -1e-3)]))
         for step_s in (-1, 4.17, 1e-9, float("nan")):
             wrong = carillon.Trace(step=step_s)
-            wrong.step(0, impulses=carillon.Impulses(wrong.add(self.model), [(0, 0, 0)], [(0, 0, -1e-3)]))
+            wrong.step(0, impacts=carillon.Impacts(wrong.add(self.model), [(0, 0, 0)], [(0, 0, -1e-3)]))
             with self.assertRaisesRegex(carillon.CarillonError, "step_s is .*; say the simulator's step, from 1e-6"):
                 self.c.render(wrong)
         with self.assertRaisesRegex(ValueError, r"must end with \.wav"):
@@ -86,7 +86,7 @@ class SceneThatEndsTooEarlyTest(PackageTest):
             with self.c.recording() as record:
                 with self.c.scene() as scene:
                     with scene.stream(step=0.001, delay=1) as stream:
-                        stream.step(0, impulses=carillon.Impulses(scene.add(self.model), [POINT], [IMPULSE]))
+                        stream.step(0, impacts=carillon.Impacts(scene.add(self.model), [POINT], [IMPULSE]))
                     self.assertEqual((stream.report.accepted_count, stream.findings.blow_count), (1, 0))
                     if waits:  # as docs/ten_minutes_python.md says
                         time.sleep(stream.report.ahead_s + 0.1)

@@ -143,7 +143,7 @@ class SoundTest(PackageTest):
                 for i in range(24):
                     contacts = carillon.Contacts(bars, [POINT, POINT], [IMPULSE, IMPULSE], partners=[7, 8])
                     stream.step(i / 240, contacts=contacts,
-                                impulses=carillon.Impulses(bars[0], POINT, IMPULSE, durations=DURATION_S),
+                                impacts=carillon.Impacts(bars[0], POINT, IMPULSE, durations=DURATION_S),
                                 poses=carillon.Poses(bars, [(i, 0, 0), (i, 1, 0)]))
         self.assertEqual((stream.report.step_count, stream.report.rejected_count), (24, 0))
         self.assertGreaterEqual(stream.report.accepted_count + stream.report.late_count, 24)
@@ -186,7 +186,7 @@ class SoundTest(PackageTest):
     def test_a_stream_that_is_too_fast_drops_the_oldest_steps(self):
         with self.c.scene() as scene:
             stream = scene.stream(step=0.001)
-            step = contact_pb2.ContactStep(columns=contact_pb2.ImpulseColumns(object=[1] * 200))
+            step = contact_pb2.ContactStep(contact_columns=[contact_pb2.ContactColumns(object=[1] * 200)])
             for i in range(20000):
                 step.time_s = 0.001 * i
                 stream.send(contact_pb2.ContactStep.FromString(step.SerializeToString()))
@@ -206,7 +206,7 @@ class SoundTest(PackageTest):
     def test_a_trace_is_written_read_and_rendered(self):
         trace = carillon.Trace(1 / 60, simulator="test")
         bar = trace.add(self.model, label="bar")
-        trace.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE, durations=DURATION_S))
+        trace.step(0.0, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
         trace.step(0.5, contacts=carillon.Contacts([bar], [POINT], [IMPULSE]))
         file = self.folder / "trace.contacts"
         trace.write(file)
@@ -246,22 +246,22 @@ class ContactsTest(PackageTest):
 
     def test_an_offset_delays_a_strike_within_its_step(self):
         def strike(**columns):
-            return {"impulses": carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
+            return {"impacts": carillon.Impacts(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
         self.assert_same(self.rendered((0.25, strike())), self.rendered((0.0, strike(time_offsets=0.25))))
 
     def test_the_frame_of_the_scene_is_turned_into_that_of_the_object(self):
         half = 0.5**0.5
         pose = ((1, 2, 3), (half, 0, 0, half))  # a quarter turn about z: x of the object is y of the scene
         x, y, z = POINT
-        own = self.rendered((0.0, {"impulses": carillon.Impulses(1, POINT, (0, 1e-3, -2e-3), durations=DURATION_S)}))
-        scene = self.rendered((0.0, {"impulses": carillon.Impulses(1, (1 - y, 2 + x, 3 + z), (-1e-3, 0, -2e-3),
-                                                                   durations=DURATION_S)}),
+        own = self.rendered((0.0, {"impacts": carillon.Impacts(1, POINT, (0, 1e-3, -2e-3), durations=DURATION_S)}))
+        scene = self.rendered((0.0, {"impacts": carillon.Impacts(1, (1 - y, 2 + x, 3 + z), (-1e-3, 0, -2e-3),
+                                                                 durations=DURATION_S)}),
                               poses=[pose], frame="scene")
         numpy.testing.assert_allclose(scene.samples, own.samples, atol=1e-5 * own.peak)
 
     def test_a_second_object_is_struck_too(self):
         def strike(**columns):
-            return {"impulses": carillon.Impulses(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
+            return {"impacts": carillon.Impacts(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
         x, y, _ = POINT
         bottom = (x, y, 0)
         alone = self.rendered((0.0, strike()), object_count=2)
@@ -288,7 +288,7 @@ class ContactsTest(PackageTest):
 
     def test_a_force_is_heard_by_its_roughness_and_not_by_its_end(self):
         def slid(newtons, **roughness):
-            force = carillon.Forces(1, [POINT], [(0, 0, -newtons)], **roughness)
+            force = carillon.ContactForces(1, [POINT], [(0, 0, -newtons)], **roughness)
             return self.rendered(*[(i / 240, {"forces": force}) for i in range(24)], (24 / 240, {}))
         rough = {"travel_speeds": [1.0], "roughness_depth": 0.5, "irregularity_length": 1e-4}
         loud, quiet = slid(10, **rough), slid(5, **rough)
@@ -337,7 +337,7 @@ class AioTest(PackageTest):
                 self.assertGreater(turns, 3)
                 self.assertEqual([found.name async for found in c.models(label_contains="bar")], [model.name])
                 async with scene.stream(step=0.01) as stream:
-                    stream.step(0.0, impulses=carillon.Impulses(bar, POINT, IMPULSE))
+                    stream.step(0.0, impacts=carillon.Impacts(bar, POINT, IMPULSE))
                 self.assertEqual(stream.report.step_count, 1)
                 self.assertIsNone(stream.rejection)
                 self.assertEqual([item.handle for item in await scene.objects()], [bar.handle])
@@ -376,18 +376,18 @@ class ValuesTest(unittest.TestCase):
         points, impulses = generator.normal(size=(2, len(handles), 3))
         step = carillon.contacts.make_step(1, contacts=carillon.Contacts(handles, points, impulses, partners=handles),
                                            poses=carillon.Poses(handles, points))
-        columns = step.contact_columns
-        self.assertEqual(list(columns.impulses.object), handles.tolist())
+        columns = step.contact_columns[0]
+        self.assertEqual(list(columns.object), handles.tolist())
         self.assertEqual(list(columns.partner), handles.tolist())
-        self.assertEqual(list(columns.impulses.point_m), points.astype("f4").ravel().tolist())
-        self.assertEqual(list(columns.impulses.impulse_newton_seconds), impulses.astype("f4").ravel().tolist())
-        self.assertEqual(list(step.pose_columns.position_m), points.ravel().tolist())
+        self.assertEqual(list(columns.point_m), points.astype("f4").ravel().tolist())
+        self.assertEqual(list(columns.impulse_newton_seconds), impulses.astype("f4").ravel().tolist())
+        self.assertEqual(list(step.poses.position_m), points.ravel().tolist())
 
     def test_columns_that_do_not_fit_are_refused_before_they_are_sent(self):
         with self.assertRaisesRegex(ValueError, "must be N x 3"):
             carillon.contacts.make_step(0, contacts=carillon.Contacts(1, [(0, 0)], [(0, 0)]))
         with self.assertRaisesRegex(ValueError, "points has 2 rows and impulses has 1"):
-            carillon.contacts.make_step(0, impulses=carillon.Impulses(1, [(0, 0, 0)] * 2, [(0, 0, 1)]))
+            carillon.contacts.make_step(0, impacts=carillon.Impacts(1, [(0, 0, 0)] * 2, [(0, 0, 1)]))
 
 
 if __name__ == "__main__":

@@ -48,8 +48,8 @@ def write_trace(model, path, number):
             left, [(0.1, 0.005, 0.01)], [(0, 0, -0.01 * (number + 1))], second_objects=[right],
             second_points=[(0.1, 0.005, 0)]) if step == 4 else None
         at = (0.2 * rng.random(), 0.01, 0.01)
-        impulses = carillon.Impulses(left, [at], [(0, 0, -0.02)]) if step == 0 else None
-        trace.step(step * 0.01, contacts=contacts, impulses=impulses)
+        impacts = carillon.Impacts(left, [at], [(0, 0, -0.02)]) if step == 0 else None
+        trace.step(step * 0.01, contacts=contacts, impacts=impacts)
     trace.write(path)
 
 

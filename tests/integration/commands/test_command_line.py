@@ -108,8 +108,8 @@ class ListsTest(CommandLineTest):
 
     def test_scenes_are_listed_with_their_objects_and_deleted(self):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        self.client.scenes.AddObject(scene_service_pb2.AddObjectRequest(
-            scene=scene, modal_model=self.model, material=MATERIAL, handle=5))
+        self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
+            scene=scene, objects=[scene_service_pb2.NewObject(modal_model=self.model, material=MATERIAL, handle=5)]))
         listed = next(item for item in self.json_of("scene", "list")["scenes"] if item["name"] == scene)
         self.assertEqual((listed["object_count"], listed["gain"], listed["muted"]), (1, 1, False))
         self.assertRegex(self.run_command("scene", "list"), rf"(?m){scene}  1 object  gain 1  .*1 connection\n  5 ")
@@ -158,7 +158,7 @@ class VolumeTest(CommandLineTest):
             with c.recording(scene=scene.name) as heard:
                 with scene.stream(step=0.01) as stream:
                     for i in range(5):
-                        stream.step(0.01 * i, impulses=carillon_package.Impulses(
+                        stream.step(0.01 * i, impacts=carillon_package.Impacts(
                             [bar], [(0, 0.008, 0.01)], [(0, 0, -0.002)], durations=1e-4))
                 self.assertIn("5 steps", recorder.communicate()[1])
                 live = heard.take(1.5)
@@ -219,7 +219,7 @@ class RenderTest(CommandLineTest):
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
         self.trace = self.folder / "trace.contacts"
-        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, contacts=[impulse])])
 
     def render(self, *options):
         out = self.folder / "out.wav"
@@ -242,7 +242,7 @@ class RenderTest(CommandLineTest):
         plain = sound.read_wave(self.render("--normalize"))
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -2e-8), duration_s=1e-4)
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
-        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, contacts=[impulse])])
         shown = self.run_command("render", self.trace, "--out", self.folder / "faint.wav", "--tail", 0.6)
         self.assertIn("raise it by --gain, --normalize or --full-scale-pa", shown)
         self.assertIn("below -70 LUFS", shown)
@@ -254,7 +254,7 @@ class RenderTest(CommandLineTest):
         plain = sound.read_wave(self.render("--normalize"))
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -20), duration_s=1e-4)
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
-        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        sound.write_trace(self.trace, [item], [contact_pb2.ContactStep(time_s=0, contacts=[impulse])])
         shown = self.run_command("render", self.trace, "--out", self.folder / "loud.wav", "--tail", 0.3)
         self.assertIn("before the limiter", shown)
         numpy.testing.assert_allclose(sound.read_wave(self.render("--normalize")), plain, atol=1e-4)

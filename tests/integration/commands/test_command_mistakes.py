@@ -77,7 +77,7 @@ class LostOutputTest(CommandLineTest):
         trace = self.folder / "lost.contacts"
         impulse = sound.impulse((0, 0.008, 0.010), (0, 0, -0.002), duration_s=1e-4)
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
-        sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, impulses=[impulse])])
+        sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, contacts=[impulse])])
         strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0.01")
         commands = (("--help",), ("--version",), ("--help-all",), ("status",), ("health",), ("db", "stats"),
                     ("doctor",), ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),

@@ -13,8 +13,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-v1::WorkerRequest Steel() {
-  v1::WorkerRequest request;
+worker::v1::WorkerRequest Steel() {
+  worker::v1::WorkerRequest request;
   request.mutable_settings()->set_poisson_ratio(0.3);
   request.mutable_material()->set_young_pa(210e9);
   request.mutable_material()->set_poisson_ratio(0.3);
@@ -38,7 +38,7 @@ TEST(WorkerRequest, ACompleteRequestHasEveryDefault) {
 }
 
 TEST(WorkerRequest, WhatIsAskedForArrivesInTheUnitsOfTheRooms) {
-  v1::WorkerRequest request = Steel();
+  worker::v1::WorkerRequest request = Steel();
   v1::DecompositionSettings& settings = *request.mutable_settings();
   settings.set_element(v1::ELEMENT_LINEAR);
   settings.set_mass_matrix(v1::MASS_MATRIX_LUMPED);
@@ -72,18 +72,20 @@ TEST(WorkerRequest, WhatIsAskedForArrivesInTheUnitsOfTheRooms) {
 
 TEST(WorkerRequest, RefusesFiguresThatNoBodyCanHave) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  const std::vector<std::function<void(v1::WorkerRequest&)>> faults = {
-      [](v1::WorkerRequest& r) { r.set_size(-1); },
-      [](v1::WorkerRequest& r) { r.set_size(std::numeric_limits<double>::infinity()); },
-      [](v1::WorkerRequest& r) { r.set_min_frequency_hz(20'000); },
-      [](v1::WorkerRequest& r) { r.set_max_frequency_hz(2e9); },
-      [](v1::WorkerRequest& r) { r.mutable_settings()->set_poisson_ratio(0.5); },
-      [](v1::WorkerRequest& r) { r.mutable_settings()->mutable_mesh()->set_accuracy(kNan); },
-      [](v1::WorkerRequest& r) { r.mutable_material()->clear_density_kg_per_m3(); },
-      [](v1::WorkerRequest& r) { r.mutable_transfer()->set_accuracy_db(0.01); },
-      [](v1::WorkerRequest& r) { r.mutable_transfer()->set_budget_s(-1); }};
+  const std::vector<std::function<void(worker::v1::WorkerRequest&)>> faults = {
+      [](worker::v1::WorkerRequest& r) { r.set_size(-1); },
+      [](worker::v1::WorkerRequest& r) { r.set_size(std::numeric_limits<double>::infinity()); },
+      [](worker::v1::WorkerRequest& r) { r.set_min_frequency_hz(20'000); },
+      [](worker::v1::WorkerRequest& r) { r.set_max_frequency_hz(2e9); },
+      [](worker::v1::WorkerRequest& r) { r.mutable_settings()->set_poisson_ratio(0.5); },
+      [](worker::v1::WorkerRequest& r) {
+        r.mutable_settings()->mutable_mesh()->set_accuracy(kNan);
+      },
+      [](worker::v1::WorkerRequest& r) { r.mutable_material()->clear_density_kg_per_m3(); },
+      [](worker::v1::WorkerRequest& r) { r.mutable_transfer()->set_accuracy_db(0.01); },
+      [](worker::v1::WorkerRequest& r) { r.mutable_transfer()->set_budget_s(-1); }};
   for (size_t i = 0; i < faults.size(); ++i) {
-    v1::WorkerRequest request = Steel();
+    worker::v1::WorkerRequest request = Steel();
     faults[i](request);
     EXPECT_THAT(Complete(request).status().ToString(), HasSubstr("INVALID_SETTINGS")) << i;
   }

@@ -50,7 +50,7 @@ class AudioApi : public ServedDaemon {
     *object.mutable_material() = SmallMaterial();
     v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
     step.set_time_s(0.5);
-    *step.add_impulses() = Strike(1);
+    *step.add_contacts() = Strike(1);
     return requests;
   }
 
@@ -138,11 +138,10 @@ TEST_F(AudioApi, PosesInTheStepsMoveTheObjectsOfATrace) {
   requests[0].mutable_settings()->set_channel_count(2);
   requests[1].mutable_record()->mutable_header()->mutable_hearing()->set_panning(true);
   v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
-  v1::ObjectPose& pose = *step.add_poses();
-  pose.set_object(1);
-  pose.mutable_pose()->mutable_position_m()->set_x(-1);
-  *step.add_poses() = pose;
-  step.mutable_poses(1)->set_object(7);  // there is none
+  for (const uint32_t object : {1U, 7U}) {  // there is no object 7
+    step.mutable_poses()->add_object(object);
+    for (const double x : {-1, 0, 0}) step.mutable_poses()->add_position_m(x);
+  }
   const Rendering rendering = Render(requests);
   ASSERT_TRUE(rendering.status.ok()) << rendering.status.error_message();
   EXPECT_EQ(rendering.summary.rejected_count(), 1U);
@@ -157,15 +156,15 @@ TEST_F(AudioApi, PosesInTheStepsMoveTheObjectsOfATrace) {
 
 /// The same as columns; what they carry must be told by points.
 void TurnIntoColumns(v1::ContactStep& step) {
-  v1::ImpulseColumns& columns = *step.mutable_columns();
+  v1::ContactColumns& columns = *step.add_contact_columns();
+  columns.set_kind(v1::CONTACT_KIND_IMPACT);
   const auto add = [](const v1::Vec3& vector, auto* column) {
-    using Number = std::decay_t<decltype(column->Get(0))>;
-    for (const double x : {vector.x(), vector.y(), vector.z()}) column->Add(static_cast<Number>(x));
+    for (const double x : {vector.x(), vector.y(), vector.z()}) column->Add(static_cast<float>(x));
   };
   const auto turn = [](const v1::Quaternion& q, auto* column) {
     for (const double x : {q.w(), q.x(), q.y(), q.z()}) column->Add(static_cast<float>(x));
   };
-  for (const v1::Impulse& row : step.impulses()) {
+  for (const v1::Contact& row : step.contacts()) {
     columns.add_object(row.object());
     add(row.point_m(), columns.mutable_point_m());
     add(row.impulse_newton_seconds(), columns.mutable_impulse_newton_seconds());
@@ -175,31 +174,29 @@ void TurnIntoColumns(v1::ContactStep& step) {
     add(row.second().point_m(), columns.mutable_second_point_m());
     turn(row.second().rotation(), columns.mutable_second_rotation());
   }
-  for (const v1::ObjectPose& row : step.poses()) {
-    step.mutable_pose_columns()->add_object(row.object());
-    add(row.pose().position_m(), step.mutable_pose_columns()->mutable_position_m());
-    turn(row.pose().orientation(), step.mutable_pose_columns()->mutable_orientation());
-  }
-  step.clear_impulses();
-  step.clear_poses();
+  step.clear_contacts();
 }
 
 /// Twenty contacts of two objects that move and turn, some of the first alone; all figures are
 /// such as single precision holds.
-std::vector<v1::ContactStep> ContactsOfTwo(const v1::Impulse& strike) {
+std::vector<v1::ContactStep> ContactsOfTwo(const v1::Contact& strike) {
   std::vector<v1::ContactStep> steps(20);
   for (int i = 0; i < 20; ++i) {
     v1::ContactStep& step = steps[i];
     step.set_time_s(0.5 + i / 64.0);
     for (const uint32_t object : {1U, 2U}) {
-      v1::ObjectPose& pose = *step.add_poses();
-      pose.set_object(object);
-      pose.mutable_pose()->mutable_position_m()->set_x((object == 1 ? -1 : 1) * (i + 1) / 16.0);
-      if (i % 2 == 0) continue;  // not turned
-      pose.mutable_pose()->mutable_orientation()->set_w(object == 1 ? 0.6F : 0.8F);
-      pose.mutable_pose()->mutable_orientation()->set_z(object == 1 ? 0.8F : 0.6F);
+      v1::PoseColumns& poses = *step.mutable_poses();
+      poses.add_object(object);
+      for (const double x : {(object == 1 ? -1 : 1) * (i + 1) / 16.0, 0.0, 0.0}) {
+        poses.add_position_m(x);
+      }
+      const bool turned = i % 2 == 1;
+      const float w = object == 1 ? 0.6F : 0.8F, z = object == 1 ? 0.8F : 0.6F;
+      for (const float x : {turned ? w : 0.0F, 0.0F, 0.0F, turned ? z : 0.0F}) {
+        poses.add_orientation(x);
+      }
     }
-    v1::Impulse& impulse = *step.add_impulses() = strike;
+    v1::Contact& impulse = *step.add_contacts() = strike;
     impulse.set_duration_s((i % 3) / 1024.0);
     impulse.set_time_offset_s(i / 4096.0);
     if (i % 5 == 4) continue;  // alone
@@ -225,9 +222,9 @@ TEST_F(AudioApi, ColumnsSoundBitForBitAsTheSameInRows) {
     *rows.emplace_back().mutable_record()->mutable_step() = step;
     TurnIntoColumns(step);
     *columns.emplace_back().mutable_record()->mutable_step() = step;
-    step.mutable_columns()->clear_second_object();
-    step.mutable_columns()->clear_second_point_m();
-    step.mutable_columns()->clear_second_rotation();
+    step.mutable_contact_columns(0)->clear_second_object();
+    step.mutable_contact_columns(0)->clear_second_point_m();
+    step.mutable_contact_columns(0)->clear_second_rotation();
     *alone.emplace_back().mutable_record()->mutable_step() = step;
   }
   const Rendering by_rows = Render(rows);
@@ -243,7 +240,7 @@ TEST_F(AudioApi, ColumnsSoundBitForBitAsTheSameInRows) {
 TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
   const std::vector<float> rendered = FromOnset(Render(Trace()).sound);
   const std::string scene = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
   std::vector<float> heard = FromOnset(Hear([&] {
     // The delay is that of the trace, for the same phase of the blocks.
@@ -302,7 +299,7 @@ TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
 TEST_F(AudioApi, ATraceThatWasHeardLiveBeginsAtItsFirstStep) {
   Requests heard = Trace();
   v1::ContactStep& step = *heard[3].mutable_record()->mutable_step();
-  step.mutable_impulses(0)->set_duration_s(0);
+  step.mutable_contacts(0)->set_duration_s(0);
   v1::ContactTraceClock& clock = *heard[1].mutable_record()->mutable_header()->mutable_clock();
   clock.set_first_frame(1280);
   clock.set_scheduling_delay_s(0.125);
@@ -363,7 +360,7 @@ TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
 
 TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {
   Requests requests = Trace();
-  *requests[3].mutable_record()->mutable_step()->add_impulses() = Strike(2);
+  *requests[3].mutable_record()->mutable_step()->add_contacts() = Strike(2);
   const Rendering rendering = Render(requests);
   ASSERT_TRUE(rendering.status.ok());
   EXPECT_EQ(rendering.summary.accepted_count(), 1U);
@@ -373,7 +370,7 @@ TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {
 }
 
 TEST_F(AudioApi, TheMixerSaysHowItPlays) {
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());
   grpc::ClientContext context;
   v1::GetMixerResponse mixer;

@@ -25,7 +25,7 @@ class AudioLevel : public ServedDaemon {
     object.set_modal_model(ImportSmallModel());
     *object.mutable_material() = SmallMaterial();
     stream->Write(request);
-    v1::Impulse& impulse = *request.mutable_record()->mutable_step()->add_impulses() = Strike(1);
+    v1::Contact& impulse = *request.mutable_record()->mutable_step()->add_contacts() = Strike(1);
     impulse.mutable_impulse_newton_seconds()->set_x(newton_seconds);
     stream->Write(request);
     stream->WritesDone();
@@ -81,7 +81,7 @@ TEST_F(AudioLevel, TheMixerStatesTheLoudnessOfWhatItPlays) {
   v1::GetMixerResponse mixer = Mixer();
   EXPECT_FALSE(mixer.has_momentary_lufs() || mixer.has_short_term_lufs());
   const std::string scene = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
   ASSERT_EQ(StrikeLive(scene).accepted_count(), 1U);
   while (!mixer.has_momentary_lufs()) mixer = Mixer();

@@ -29,10 +29,10 @@ class JobRunApi : public ServedDaemon {
   grpc::Status Fetch(const std::string& shown, std::string& bytes) {
     grpc::ClientContext context;
     Show(shown, context);
-    v1::FetchMeshRequest request;
+    worker::v1::FetchMeshRequest request;
     request.set_job("jobs/" + digest);
     const auto reader = job_runs->FetchMesh(&context, request);
-    v1::FetchMeshResponse response;
+    worker::v1::FetchMeshResponse response;
     while (reader->Read(&response)) bytes += response.data();
     return reader->Finish();
   }
@@ -40,10 +40,10 @@ class JobRunApi : public ServedDaemon {
   grpc::Status Report(const std::string& shown) {
     grpc::ClientContext context;
     Show(shown, context);
-    v1::ReportProgressRequest request;
+    worker::v1::ReportProgressRequest request;
     request.set_job("jobs/" + digest);
     request.mutable_progress()->set_fraction(0.5);
-    v1::ReportProgressResponse response;
+    worker::v1::ReportProgressResponse response;
     return job_runs->ReportProgress(&context, request, &response);
   }
 
@@ -51,9 +51,9 @@ class JobRunApi : public ServedDaemon {
   grpc::Status Upload(const std::string& shown, size_t record_count, bool ends = true) {
     grpc::ClientContext context;
     Show(shown, context);
-    v1::UploadResultResponse response;
+    worker::v1::UploadResultResponse response;
     const auto writer = job_runs->UploadResult(&context, &response);
-    v1::UploadResultRequest request;
+    worker::v1::UploadResultRequest request;
     request.set_job("jobs/" + digest);
     for (size_t i = 0; i < record_count; ++i) {
       *request.mutable_record() = records[i];

@@ -27,9 +27,9 @@ class LoadApi : public ServedDaemon {
 };
 
 TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
-  v1::AddObjectRequest object = SmallObject(CreateScene());
-  object.set_handle(1);
-  v1::AddObjectResponse added;
+  v1::AddObjectsRequest object = SmallObject(CreateScene());
+  object.mutable_objects(0)->set_handle(1);
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(object, added).ok());
   grpc::ClientContext context;
   const auto stream = contacts->StreamContacts(&context);
@@ -37,11 +37,12 @@ TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
   request.mutable_start()->set_scene(object.scene());
   request.mutable_start()->set_step_s(0.01);
   stream->Write(request);
-  for (int step = 0; step < 20; ++step) {  // times that went back would end the stream
-    request.mutable_step()->set_time_s(step * 0.01);
-    request.mutable_step()->clear_impulses();
-    const int count = step % 2 == 0 ? 5000 : 1;
-    for (int i = 0; i < count; ++i) *request.mutable_step()->add_impulses() = Strike(2);
+  for (int i = 0; i < 20; ++i) {  // times that went back would end the stream
+    request.Clear();
+    v1::ContactStep& step = *request.add_steps();
+    step.set_time_s(i * 0.01);
+    const int count = i % 2 == 0 ? 5000 : 1;
+    for (int j = 0; j < count; ++j) *step.add_contacts() = Strike(2);
     stream->Write(request);
   }
   stream->WritesDone();
@@ -87,10 +88,10 @@ TEST_F(LittleMemoryApi, ATraceThatTakesMoreThanTheClientsShareIsRefused) {
   for (int step = 0; step < 100; ++step) {
     v1::ContactStep& message = *request.mutable_record()->mutable_step();
     message.set_time_s(step);
-    message.clear_impulses();
+    message.clear_contacts();
     for (int i = 0; i < 1000; ++i) {
-      *message.add_impulses() = Strike(1);
-      message.mutable_impulses(i)->set_time_offset_s(1e-3 * i);  // equal ones would be added up
+      *message.add_contacts() = Strike(1);
+      message.mutable_contacts(i)->set_time_offset_s(1e-3 * i);  // equal ones would be added up
     }
     if (!stream->Write(request)) break;
   }

@@ -93,7 +93,7 @@ TEST_F(ReflectionTest, HasTheFileOfEveryServiceThatItLists) {
 
 TEST_F(ReflectionTest, SendsEachFileWithAllThatItImports) {
   Reflected reflected(channel());
-  const auto answer = reflected.AskForSymbol("carillon.v1.SceneService.AddObject");
+  const auto answer = reflected.AskForSymbol("carillon.v1.SceneService.AddObjects");
   google::protobuf::SimpleDescriptorDatabase files;
   for (const std::string& bytes : answer.file_descriptor_response().file_descriptor_proto()) {
     google::protobuf::FileDescriptorProto file;
@@ -101,9 +101,9 @@ TEST_F(ReflectionTest, SendsEachFileWithAllThatItImports) {
     EXPECT_TRUE(files.Add(file)) << file.name();
   }
   google::protobuf::DescriptorPool pool(&files);
-  const auto* const method = pool.FindMethodByName("carillon.v1.SceneService.AddObject");
+  const auto* const method = pool.FindMethodByName("carillon.v1.SceneService.AddObjects");
   ASSERT_NE(method, nullptr);
-  EXPECT_NE(method->input_type()->FindFieldByName("modal_model"), nullptr);
+  EXPECT_NE(method->input_type()->FindFieldByName("objects"), nullptr);
 
   reflection::ServerReflectionRequest request;
   request.set_file_by_filename("carillon/v1/scene_service.proto");

@@ -48,11 +48,11 @@ class SceneApi : public ServedDaemon {
 
 TEST_F(SceneApi, AnObjectStatesWhereItIsOnceItWasTold) {
   const std::string scene = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
-  EXPECT_FALSE(added.object().has_pose());
+  EXPECT_FALSE(added.objects(0).has_pose());
   v1::UpdateObjectRequest request;
-  request.set_name(added.object().name());
+  request.set_name(added.objects(0).name());
   request.mutable_pose()->mutable_position_m()->set_z(-3);
   v1::UpdateObjectResponse updated;
   ASSERT_TRUE(Update(request, updated).ok());
@@ -60,8 +60,8 @@ TEST_F(SceneApi, AnObjectStatesWhereItIsOnceItWasTold) {
   EXPECT_EQ(updated.object().pose().orientation().w(), 1);
   request.set_glide_s(-1);
   ExpectRefused(Update(request, updated), grpc::INVALID_ARGUMENT, "INVALID_GLIDE");
-  v1::AddObjectRequest nowhere = SmallObject(scene);
-  nowhere.mutable_pose()->mutable_position_m()->set_x(1e7);
+  v1::AddObjectsRequest nowhere = SmallObject(scene);
+  nowhere.mutable_objects(0)->mutable_pose()->mutable_position_m()->set_x(1e7);
   ExpectRefused(Add(nowhere, added), grpc::INVALID_ARGUMENT, "INVALID_POSE");
 }
 
@@ -83,9 +83,9 @@ TEST_F(SceneApi, TheListenerOfASceneCanBeMoved) {
 
 TEST_F(SceneApi, AnObjectStatesHowItSounds) {
   const std::string scene = CreateScene();
-  v1::AddObjectResponse response;
+  v1::AddObjectsResponse response;
   ASSERT_TRUE(Add(SmallObject(scene), response).ok());
-  const v1::SoundingObject& object = response.object();
+  const v1::SoundingObject& object = response.objects(0);
   EXPECT_EQ(object.name(), scene + "/objects/1");
   EXPECT_EQ(object.handle(), 1U);
   EXPECT_EQ(object.size(), 1);
@@ -97,30 +97,30 @@ TEST_F(SceneApi, AnObjectStatesHowItSounds) {
 }
 
 TEST_F(SceneApi, AnObjectWithoutAMaterialGetsTheOneOfItsModel) {
-  v1::AddObjectRequest request = SmallObject(CreateScene());
-  request.clear_material();
-  v1::AddObjectResponse response;
+  v1::AddObjectsRequest request = SmallObject(CreateScene());
+  request.mutable_objects(0)->clear_material();
+  v1::AddObjectsResponse response;
   ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
   v1::UpdateModalModelRequest change;
-  change.set_name(request.modal_model());
+  change.set_name(request.objects(0).modal_model());
   *change.mutable_material() = SmallMaterial();
   v1::UpdateModalModelResponse changed;
   ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, change, changed).ok());
   EXPECT_EQ(changed.modal_model().material().young_pa(), SmallMaterial().young_pa());
   ASSERT_TRUE(Add(request, response).ok());
-  EXPECT_NEAR(response.object().lowest_frequency_hz(), 440, 1e-9);
+  EXPECT_NEAR(response.objects(0).lowest_frequency_hz(), 440, 1e-9);
   change.mutable_material()->set_preset("cheese");
   ExpectRefused(Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, change, changed),
                 grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
-  request.set_modal_model("modalModels/" + std::string(64, '0'));
+  request.mutable_objects(0)->set_modal_model("modalModels/" + std::string(64, '0'));
   ExpectRefused(Add(request, response), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
 }
 
 TEST_F(SceneApi, AnUpdateAnswersWithTheObjectAsItIsNow) {
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());
   v1::UpdateObjectRequest request;
-  request.set_name(added.object().name());
+  request.set_name(added.objects(0).name());
   request.set_size(2);
   request.set_gain(0.5);
   v1::UpdateObjectResponse response;
@@ -133,10 +133,10 @@ TEST_F(SceneApi, AnUpdateAnswersWithTheObjectAsItIsNow) {
 TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
   const std::string empty = CreateScene();
   const std::string full = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   for (const uint32_t handle : {7U, 3U}) {
-    v1::AddObjectRequest request = SmallObject(full);
-    request.set_handle(handle);
+    v1::AddObjectsRequest request = SmallObject(full);
+    request.mutable_objects(0)->set_handle(handle);
     ASSERT_TRUE(Add(request, added).ok());
   }
   grpc::ClientContext context;
@@ -155,7 +155,7 @@ TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
   ASSERT_EQ(objects.objects_size(), 2);
   EXPECT_EQ(objects.objects(0).handle(), 3U);
   EXPECT_EQ(objects.objects(1).SerializeAsString(), [&] {
-    v1::SoundingObject expected = added.object();
+    v1::SoundingObject expected = added.objects(0);
     expected.set_handle(7);
     expected.set_name(full + "/objects/7");
     return expected.SerializeAsString();
@@ -168,15 +168,15 @@ TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
 
 TEST_F(SceneApi, WhatIsNotThereIsNotFound) {
   const std::string scene = CreateScene();
-  const v1::AddObjectRequest good = SmallObject(scene);
-  v1::AddObjectResponse added;
-  v1::AddObjectRequest request = good;
+  const v1::AddObjectsRequest good = SmallObject(scene);
+  v1::AddObjectsResponse added;
+  v1::AddObjectsRequest request = good;
   request.set_scene("scenes/77");
   ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
   request.set_scene("nonsense");
   ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
   request = good;
-  request.set_modal_model(std::string("modalModels/").append(64, '0'));
+  request.mutable_objects(0)->set_modal_model(std::string("modalModels/").append(64, '0'));
   ExpectRefused(Add(request, added), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
   ExpectRefused(Remove(scene + "/objects/5"), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
   ExpectRefused(Remove(scene), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
@@ -193,50 +193,52 @@ TEST_F(SceneApi, WhatIsNotThereIsNotFound) {
 }
 
 TEST_F(SceneApi, AnObjectThatCannotSoundIsRefusedWithItsReason) {
-  const v1::AddObjectRequest good = SmallObject(CreateScene());
-  v1::AddObjectResponse response;
-  v1::AddObjectRequest request = good;
-  request.mutable_material()->set_preset("cheese");
+  const v1::AddObjectsRequest good = SmallObject(CreateScene());
+  v1::AddObjectsResponse response;
+  v1::AddObjectsRequest request = good;
+  request.mutable_objects(0)->mutable_material()->set_preset("cheese");
   ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
   request = good;
-  request.mutable_material()->set_density_kg_per_m3(-1);
+  request.mutable_objects(0)->mutable_material()->set_density_kg_per_m3(-1);
   ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
   request = good;
-  request.set_size(-1);
+  request.mutable_objects(0)->set_size(-1);
   ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_OBJECT");
   request = good;
-  request.mutable_material()->set_poisson_ratio(0.2);
+  request.mutable_objects(0)->mutable_material()->set_poisson_ratio(0.2);
   ExpectRefused(Add(request, response), grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");
   request = good;
-  request.set_size(0.01);
+  request.mutable_objects(0)->set_size(0.01);
   const grpc::Status status = Add(request, response);
   ExpectRefused(status, grpc::FAILED_PRECONDITION, "NO_MODE_IN_BAND");
   EXPECT_NEAR(std::stod(ErrorOf(status).metadata().at("first_mode_hz")), 44000, 1);
   request = good;
-  request.set_handle(3);
+  request.mutable_objects(0)->set_handle(3);
   ASSERT_TRUE(Add(request, response).ok());
   ExpectRefused(Add(request, response), grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
 }
 
 TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
   const std::string scene = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
-  v1::StreamContactsRequest step;
-  *step.mutable_step()->add_impulses() = Strike(1);
-  *step.mutable_step()->add_impulses() = Strike(99);
-  step.mutable_step()->add_impulses()->set_object(1);  // no location
+  v1::StreamContactsRequest request;
+  v1::ContactStep& step = *request.add_steps();
+  *step.add_contacts() = Strike(1);
+  *step.add_contacts() = Strike(99);
+  step.add_contacts()->set_object(1);  // no location
   v1::StreamContactsRequest columns;
-  v1::ImpulseColumns& column = *columns.mutable_step()->mutable_columns();
+  v1::ContactColumns& column = *columns.add_steps()->add_contact_columns();
+  column.set_kind(v1::CONTACT_KIND_IMPACT);
   for (int i = 0; i < 2; ++i) {
     column.add_object(1);
     for (const float x : {0.0F, 0.0F, 0.0F}) column.add_point_m(x);
     for (const float x : {1.0F, 0.0F, 0.0F}) column.add_impulse_newton_seconds(x);
   }
   v1::StreamContactsRequest ragged = columns;
-  ragged.mutable_step()->mutable_columns()->add_point_m(0);
+  ragged.mutable_steps(0)->mutable_contact_columns(0)->add_point_m(0);
   v1::StreamContactsResponse last;
-  ASSERT_TRUE(Exchange({Start(scene), step, columns, ragged}, last).ok());
+  ASSERT_TRUE(Exchange({Start(scene), request, columns, ragged}, last).ok());
   EXPECT_EQ(last.step_count(), 3U);
   // Whether a block was rendered in between is the machine's affair; nothing may be lost.
   EXPECT_EQ(last.accepted_count() + last.late_count(), 3U);
@@ -249,15 +251,15 @@ TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
 
 TEST_F(SceneApi, StepsOfOneMessageAreTakenAsIfEachCameAlone) {
   const std::string scene = CreateScene();
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(scene), added).ok());
   v1::StreamContactsRequest together;
   // More rows than gRPC's thread takes at once.
   for (int i = 0; i < 300; ++i) {
-    v1::ContactStep& step = *together.mutable_steps()->add_steps();
+    v1::ContactStep& step = *together.add_steps();
     step.set_time_s(0.01 * i);
-    *step.add_impulses() = Strike(1);
-    if (i == 7) *step.add_impulses() = Strike(99);
+    *step.add_contacts() = Strike(1);
+    if (i == 7) *step.add_contacts() = Strike(99);
   }
   v1::StreamContactsResponse last;
   ASSERT_TRUE(Exchange({Start(scene), together}, last).ok());
@@ -265,7 +267,7 @@ TEST_F(SceneApi, StepsOfOneMessageAreTakenAsIfEachCameAlone) {
   EXPECT_EQ(last.accepted_count() + last.late_count(), 300U);
   EXPECT_EQ(last.rejected_count(), 1U);
   EXPECT_THAT(last.last_rejection().message(), testing::HasSubstr("at 0.07 s"));
-  together.mutable_steps()->mutable_steps(150)->set_time_s(0.3);
+  together.mutable_steps(150)->set_time_s(0.3);
   const grpc::Status refused = Exchange({Start(scene), together}, last);
   ExpectRefused(refused, grpc::INVALID_ARGUMENT, "INVALID_STREAM");
   EXPECT_THAT(refused.error_message(), testing::HasSubstr("at step 150"));
@@ -290,9 +292,9 @@ TEST_F(SceneApi, TheFirstAnswerComesBeforeAnyStep) {
 TEST_F(SceneApi, AStreamOutOfOrderIsRefused) {
   const std::string scene = CreateScene();
   v1::StreamContactsRequest step;
-  step.mutable_step()->set_time_s(1);
+  step.add_steps()->set_time_s(1);
   v1::StreamContactsRequest earlier;
-  earlier.mutable_step()->set_time_s(0.5);
+  earlier.add_steps()->set_time_s(0.5);
   v1::StreamContactsRequest no_step_s = Start(scene);
   no_step_s.mutable_start()->clear_step_s();
   v1::StreamContactsResponse last;

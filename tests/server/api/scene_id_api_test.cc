@@ -72,9 +72,9 @@ TEST_F(SceneIdApi, TheSameRequestAgainGivesTheSameSceneWithItsObjects) {
   ASSERT_TRUE(Create(request).ok());
   EXPECT_EQ(created.name(), "scenes/lathe-1");
   EXPECT_FALSE(created.existing());
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(SmallObject(created.name()), added).ok());
-  EXPECT_EQ(added.object().name(), "scenes/lathe-1/objects/1");
+  EXPECT_EQ(added.objects(0).name(), "scenes/lathe-1/objects/1");
   v1::UpdateSceneRequest louder;
   louder.set_name(created.name());
   louder.set_gain(2);
@@ -216,7 +216,7 @@ class AddObjectsApi : public SceneIdApi {
   v1::AddObjectsRequest Objects(const std::vector<uint32_t>& handles) {
     v1::AddObjectsRequest request;
     request.set_scene(scene_);
-    const v1::AddObjectRequest object = SmallObject("");
+    const v1::NewObject object = SmallObject("").objects(0);
     for (const uint32_t handle : handles) {
       *request.add_objects() = object;
       request.mutable_objects()->rbegin()->set_handle(handle);
@@ -272,11 +272,15 @@ TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
   request = Objects({1, 2, 3});
   request.mutable_objects(0)->mutable_material()->set_preset("unobtainium");
   ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL", "0");
-  request = Objects({1, 2});
-  request.mutable_objects(1)->set_scene("scenes/other");
-  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_NAME", "1");
-  request.mutable_objects(1)->set_scene(scene_);
-  EXPECT_TRUE(AddAll(request).ok());
+  EXPECT_TRUE(AddAll(Objects({1, 2})).ok());
+}
+
+TEST_F(AddObjectsApi, AloneIsRefusedWithoutAPlace) {
+  v1::AddObjectsRequest request = Objects({1});
+  request.mutable_objects(0)->set_size(-1);
+  const grpc::Status status = AddAll(request);
+  ExpectRefused(status, grpc::INVALID_ARGUMENT, "INVALID_OBJECT");
+  EXPECT_EQ(ErrorOf(status).metadata().count("index"), 0U);
 }
 
 TEST_F(AddObjectsApi, AHandleOfTheSceneIsTaken) {

@@ -15,10 +15,10 @@
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "carillon/v1/decomposition_service.grpc.pb.h"
 #include "carillon/v1/error.pb.h"
-#include "carillon/v1/job_run_service.grpc.pb.h"
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "carillon/v1/server_service.grpc.pb.h"
+#include "carillon/worker/v1/job_run_service.grpc.pb.h"
 #include "server/api/api_server.h"
 #include "server/live_output/live_output.h"
 #include "tests/server/api/daemon_rooms.h"
@@ -40,7 +40,7 @@ class ServedDaemon : public testing::Test {
     scenes = v1::SceneService::NewStub(channel_);
     contacts = v1::ContactService::NewStub(channel_);
     audio = v1::AudioService::NewStub(channel_);
-    job_runs = v1::JobRunService::NewStub(channel_);
+    job_runs = worker::v1::JobRunService::NewStub(channel_);
     info = v1::ServerService::NewStub(channel_);
   }
 
@@ -95,22 +95,25 @@ class ServedDaemon : public testing::Test {
     return material;
   }
 
-  v1::AddObjectRequest SmallObject(const std::string& scene) {
-    v1::AddObjectRequest request;
+  /// The request for one object of SmallModel.
+  v1::AddObjectsRequest SmallObject(const std::string& scene) {
+    v1::AddObjectsRequest request;
     request.set_scene(scene);
-    request.set_modal_model(ImportSmallModel());
-    *request.mutable_material() = SmallMaterial();
+    v1::NewObject& object = *request.add_objects();
+    object.set_modal_model(ImportSmallModel());
+    *object.mutable_material() = SmallMaterial();
     return request;
   }
 
-  grpc::Status Add(const v1::AddObjectRequest& request, v1::AddObjectResponse& response) {
+  grpc::Status Add(const v1::AddObjectsRequest& request, v1::AddObjectsResponse& response) {
     grpc::ClientContext context;
-    return scenes->AddObject(&context, request, &response);
+    return scenes->AddObjects(&context, request, &response);
   }
 
   /// 1 N s along x at the origin of object `handle`.
-  static v1::Impulse Strike(uint32_t handle) {
-    v1::Impulse impulse;
+  static v1::Contact Strike(uint32_t handle) {
+    v1::Contact impulse;
+    impulse.set_kind(v1::CONTACT_KIND_IMPACT);
     impulse.set_object(handle);
     impulse.mutable_point_m();
     impulse.mutable_impulse_newton_seconds()->set_x(1);
@@ -129,7 +132,8 @@ class ServedDaemon : public testing::Test {
       request.mutable_start()->set_scheduling_delay_s(*scheduling_delay_s);
     }
     stream->Write(request);
-    *request.mutable_step()->add_impulses() = Strike(1);
+    request.Clear();
+    *request.add_steps()->add_contacts() = Strike(1);
     stream->Write(request);
     stream->WritesDone();
     v1::StreamContactsResponse answer;
@@ -144,7 +148,7 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::ContactService::Stub> contacts;
   std::unique_ptr<v1::AudioService::Stub> audio;
-  std::unique_ptr<v1::JobRunService::Stub> job_runs;
+  std::unique_ptr<worker::v1::JobRunService::Stub> job_runs;
   std::unique_ptr<v1::ServerService::Stub> info;
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
   LiveOutput& output() { return *rooms_.output; }

@@ -120,15 +120,15 @@ TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
 
 TEST_F(SharedModelsApi, AMaterialWithWhichTheModelCannotSoundIsRefused) {
   const std::string scene = CreateScene();
-  v1::AddObjectRequest object = SmallObject(scene);
+  v1::AddObjectsRequest object = SmallObject(scene);
   v1::UpdateModalModelRequest request;
-  request.set_name(object.modal_model());
-  *request.mutable_material() = object.material();
-  object.clear_material();
+  request.set_name(object.objects(0).modal_model());
+  *request.mutable_material() = object.objects(0).material();
+  object.mutable_objects(0)->clear_material();
   v1::UpdateModalModelResponse response;
   const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
   ASSERT_TRUE(Call(*neighbours_, update, request, response).ok());
-  v1::AddObjectResponse added;
+  v1::AddObjectsResponse added;
   ASSERT_TRUE(Add(object, added).ok());
 
   request.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio + 0.1);

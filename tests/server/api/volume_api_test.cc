@@ -30,7 +30,7 @@ class VolumeApi : public ServedDaemon {
 
   std::string SceneWithObject() {
     std::string scene = CreateScene();
-    v1::AddObjectResponse added;
+    v1::AddObjectsResponse added;
     EXPECT_TRUE(Add(SmallObject(scene), added).ok());
     return scene;
   }

@@ -236,7 +236,7 @@ TEST_F(LocalExecutorTest, TheRequestsTimeLimitBinds) {
 }
 
 TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   event.mutable_progress()->set_node_count(1'000'000);
   WriteEvents(EventBytes(event));
   options_.kernel_counts = folder_ / "vmstat";

@@ -12,25 +12,26 @@
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
+#include "carillon/worker/v1/worker.pb.h"
 #include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
 
 /// An event as a worker writes it.
-inline std::string EventBytes(const v1::WorkerEvent& event) {
+inline std::string EventBytes(const worker::v1::WorkerEvent& event) {
   const std::string body = event.SerializeAsString();
   return std::string(1, static_cast<char>(body.size())) + body;
 }
 
 inline std::string ProgressBytes(double fraction) {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   event.mutable_progress()->set_phase(v1::PHASE_SOLVE);
   event.mutable_progress()->set_fraction(fraction);
   return EventBytes(event);
 }
 
 inline std::string ErrorBytes(const std::string& reason) {
-  v1::WorkerEvent event;
+  worker::v1::WorkerEvent event;
   event.mutable_error()->set_reason(reason);
   event.mutable_error()->set_message("as the script was told");
   return EventBytes(event);

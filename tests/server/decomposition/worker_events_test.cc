@@ -23,7 +23,7 @@ TEST(WorkerEvents, AreTheSameHoweverTheBytesAreCut) {
     for (size_t at = 0; at < bytes.size(); at += piece) {
       ASSERT_TRUE(reader
                       .Feed(std::string_view(bytes).substr(at, piece),
-                            [&](const v1::WorkerEvent& event) {
+                            [&](const worker::v1::WorkerEvent& event) {
                               if (event.has_error()) reasons.push_back(event.error().reason());
                               if (event.has_progress()) {
                                 fractions.push_back(event.progress().fraction());
@@ -46,7 +46,7 @@ TEST(WorkerEvents, RefusesGarbageWithoutKeepingIt) {
   };
   for (const std::string& bytes : garbage) {
     WorkerEventReader reader;
-    EXPECT_TRUE(absl::IsDataLoss(reader.Feed(bytes, [](const v1::WorkerEvent&) {})));
+    EXPECT_TRUE(absl::IsDataLoss(reader.Feed(bytes, [](const worker::v1::WorkerEvent&) {})));
   }
 }
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <google/protobuf/message.h>
+
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -18,30 +21,24 @@
 #include "carillon/v1/contact_service.pb.h"
 #include "carillon/v1/decomposition_service.pb.h"
 #include "carillon/v1/error.pb.h"
-#include "carillon/v1/job_run_service.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
 #include "carillon/v1/scene_service.pb.h"
 #include "carillon/v1/server_service.pb.h"
 
 namespace carillon::client {
 
-/// Identifies one run of a decomposition job on a machine of a cluster to the daemon.
-struct JobRun {
-  std::string job;    ///< "jobs/{digest}"
-  std::string token;  ///< the token that the daemon gave to the batch job
-};
-
 /// The calls of a Carillon daemon. The files proto/carillon/v1/*_service.proto, which are installed
 /// with this header, describe each call, its limits and the units of its fields.
 ///
 /// Connect() makes a client of a real daemon. Code that takes a `const Client&` can be tested
 /// without one: derive a fake or a gmock class from Client and override the calls that the test
-/// needs. The base class answers every other call with UNIMPLEMENTED.
+/// needs, or Call() for many of them. The base class answers every other call with UNIMPLEMENTED.
 ///
 /// Errors: a failed call returns a status whose message is "REASON: text for people"; ToErrorInfo()
 /// takes it apart. proto/README.md lists the reasons that the daemon gives. In addition, every call
-/// can return UNAVAILABLE (SERVER_UNAVAILABLE) if no daemon answers, and a call that transfers no
-/// stream and no file can return DEADLINE_EXCEEDED (SERVER_TIMEOUT) after 60 seconds.
+/// can return UNAVAILABLE (SERVER_UNAVAILABLE) if no daemon answers, and DEADLINE_EXCEEDED
+/// (SERVER_TIMEOUT) after the time that WithTimeout() was given. Without it, a call that transfers
+/// no stream and no file gives up after 60 seconds, and other calls never.
 ///
 /// Threads: any number of threads may call the methods of one client at the same time. A call
 /// blocks its thread until the daemon has answered. Callbacks run on the calling thread. A call
@@ -54,6 +51,11 @@ class Client {
   /// Receives the records of a stored modal model in order. An error that it returns ends the
   /// transfer.
   using RecordSink = std::function<absl::Status(const v1::ModalModelRecord&)>;
+
+  /// Returns a client of the same connection each of whose calls ends after `timeout` with
+  /// DEADLINE_EXCEEDED (SERVER_TIMEOUT) if it has not ended before. A contact stream that this
+  /// client opens ends then, too. This client need not outlive the other one.
+  virtual std::unique_ptr<Client> WithTimeout(std::chrono::milliseconds timeout) const;
 
   // The daemon.
 
@@ -159,13 +161,11 @@ class Client {
 
   // Scenes and their sounding objects.
 
-  /// Creates a scene and returns its name, "scenes/{id}".
-  virtual absl::StatusOr<std::string> CreateScene(const v1::CreateSceneRequest& request) const;
-
-  /// Does the same as CreateScene, and also says whether the scene was there before. A request
-  /// without an id always makes a new scene.
-  virtual absl::StatusOr<v1::CreateSceneResponse> CreateOrFindScene(
-      const v1::CreateSceneRequest& request) const;
+  /// Creates a scene, or finds the scene that has the id of the request. Returns its name,
+  /// "scenes/{id}", and whether it was there before. A request without an id always makes a new
+  /// scene.
+  virtual absl::StatusOr<v1::CreateSceneResponse> CreateScene(
+      const v1::CreateSceneRequest& request = {}) const;
 
   /// Returns the scene "scenes/{id}".
   virtual absl::StatusOr<v1::Scene> GetScene(const std::string& name) const;
@@ -188,12 +188,9 @@ class Client {
   virtual absl::StatusOr<std::vector<v1::SoundingObject>> ListObjects(
       const std::string& scene) const;
 
-  /// Adds an object that sounds with a stored model to a scene. Contacts refer to the object by its
-  /// handle, which the caller may choose.
-  virtual absl::StatusOr<v1::SoundingObject> AddObject(const v1::AddObjectRequest& request) const;
-
-  /// Adds all of the objects to a scene, or none of them. The figure "index" of an error is the
-  /// place of the object that was refused.
+  /// Adds objects that sound with stored models to a scene, all of them or none, and returns them
+  /// in the order of the request. Contacts refer to an object by its handle, which the caller may
+  /// choose. The figure "index" of an error is the place of the object that was refused.
   virtual absl::StatusOr<std::vector<v1::SoundingObject>> AddObjects(
       const v1::AddObjectsRequest& request) const;
 
@@ -223,25 +220,17 @@ class Client {
   /// Passes the sound that `request` asks for, of the output or of one scene, to `on_block` until
   /// `on_block` returns false or the scene is deleted; then returns OK. Samples come as floats,
   /// whatever their encoding on the wire is.
-  virtual absl::Status ListenTo(const v1::ListenRequest& request,
-                                const AudioCallback& on_block) const;
-
-  /// Passes the sound of the mixer to `on_block` until `on_block` returns false; then returns OK.
-  virtual absl::Status Listen(const AudioCallback& on_block) const;
+  virtual absl::Status Listen(const v1::ListenRequest& request,
+                              const AudioCallback& on_block) const;
 
   /// Renders the rest of `trace` offline, as fast as the daemon can, and passes the sound to
-  /// `on_block`. A reader is at its end after a rendering. Further errors: those of
-  /// ContactTraceReader::Next; INVALID_ARGUMENT (TRACE_EMPTY) if nothing of `trace` is left;
-  /// CANCELLED (RENDERING_STOPPED) if `on_block` returned false.
-  virtual absl::StatusOr<v1::RenderSummary> Render(const v1::RenderSettings& settings,
-                                                   ContactTraceReader& trace,
-                                                   const AudioCallback& on_block) const;
-
-  /// Renders as above. After the sound, passes each impulse that sounded to `on_blow`, which may be
-  /// null, if `settings.tell_blows()` is true.
+  /// `on_block`. After the sound, passes each impulse that sounded to `on_blow`, unless it is null,
+  /// if `settings.tell_blows()` is true. A reader is at its end after a rendering. Further errors:
+  /// those of ContactTraceReader::Next; INVALID_ARGUMENT (TRACE_EMPTY) if nothing of `trace` is
+  /// left; CANCELLED (RENDERING_STOPPED) if `on_block` returned false.
   virtual absl::StatusOr<v1::RenderSummary> Render(
       const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
-      const std::function<void(const v1::Blow&)>& on_blow) const;
+      const std::function<void(const v1::Blow&)>& on_blow = nullptr) const;
 
   /// Returns the state of the mixer and the audio device.
   virtual absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
@@ -249,22 +238,6 @@ class Client {
   /// Changes the gain of the output or mutes it. Over TCP this needs the role "administer".
   virtual absl::StatusOr<v1::UpdateMixerResponse> UpdateMixer(
       const v1::UpdateMixerRequest& request) const;
-
-  // Runs of decomposition jobs on the machines of a cluster.
-
-  /// Begins a run and writes the mesh of its job to a file.
-  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE).
-  virtual absl::Status FetchMesh(const JobRun& run, const std::string& file) const;
-
-  /// Tells the daemon how far a run has come. Gives up after 2 seconds, so that a run does not
-  /// wait for its own report.
-  virtual absl::Status ReportProgress(const JobRun& run, const v1::Progress& progress) const;
-
-  /// Ends a run. Sends the model or the transfer of `model_file`, in the stored form, unless that
-  /// name is empty.
-  /// Further errors: NOT_FOUND (FILE_NOT_FOUND), INVALID_ARGUMENT (MODAL_MODEL_MALFORMED).
-  virtual absl::Status UploadResult(const JobRun& run, const v1::RunEnd& end,
-                                    const std::string& model_file) const;
 
   // Administration; over TCP these calls need the role "administer".
 
@@ -281,6 +254,12 @@ class Client {
   /// Further errors: INVALID_ARGUMENT (INVALID_BUDGET).
   virtual absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(
       const v1::CollectGarbageRequest& request) const;
+
+ protected:
+  /// Makes a call with one request and one answer; all methods for such calls use it. `method` is
+  /// the name of the call in the contract, for example "SceneService/GetScene".
+  virtual absl::Status Call(absl::string_view method, const google::protobuf::Message& request,
+                            google::protobuf::Message& response) const;
 };
 
 /// What Connect() may need beyond an address.

@@ -16,8 +16,8 @@ namespace carillon::client {
 struct SceneRegistration {
   /// The scene. Its id must not be empty, so that registering again finds it.
   v1::CreateSceneRequest scene;
-  /// Its objects, each with a handle of its own above zero. Their field `scene` is ignored.
-  std::vector<v1::AddObjectRequest> objects;
+  /// Its objects, each with a handle of its own above zero.
+  std::vector<v1::NewObject> objects;
 };
 
 /// Makes a scene with its objects and returns its name. If the scene exists, objects of it that

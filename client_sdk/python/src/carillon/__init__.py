@@ -16,7 +16,7 @@ from carillon import forks  # before gRPC is imported
 from carillon import aio
 from carillon.address import default_server
 from carillon.client import Client, connect
-from carillon.contacts import Contacts, Forces, Impulses, Poses, striker
+from carillon.contacts import ContactForces, Contacts, Impacts, Poses, striker
 from carillon.errors import (
     CarillonError, ContactWarning, LabelWarning, ServerUnavailable, TransferWarning, UnitWarning)
 from carillon.jobs import Job
@@ -29,7 +29,7 @@ from carillon.streams import ContactStream
 from carillon.traces import Trace
 from carillon.version import __version__
 
-__all__ = ["CarillonError", "Client", "ContactStream", "ContactWarning", "Contacts", "Forces", "Impulses", "Job",
+__all__ = ["CarillonError", "Client", "ContactForces", "ContactStream", "ContactWarning", "Contacts", "Impacts", "Job",
            "LabelWarning", "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject",
            "Trace", "TransferWarning", "UnitWarning", "__version__", "aio", "connect", "default_server", "material",
            "striker"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts, impulses and poses as arrays, and their way into the messages of a step."""
+"""Contacts and poses as arrays, and their way into the messages of a step."""
 
 from __future__ import annotations
 
@@ -49,16 +49,13 @@ DURATION = "zero seconds or more, or NaN, which leaves it to the daemon"
 STRIKER_FIGURES = ("mass_kg", "radius_m", "young_pa", "poisson_ratio")
 
 
-@dataclasses.dataclass
-class Impulses:
-    """Strikes, such as those of a hammer. All N rows belong together; a column that is None has its default.
+# Columns of one number a contact that are copied as they are, and their fields in ContactColumns.
+NUMBERS = {"time_offsets": "time_offset_s", "travel_speeds": "travel_speed_m_per_s"}
 
-    `objects` has the struck objects or their handles; one object stands for all rows. `points` (N x 3, metres) and
-    `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
-    seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
-    `time_offsets` are seconds from the step's time to the strike. `second_objects` has the objects that struck, zero
-    for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
-    """
+
+@dataclasses.dataclass
+class _Impulses:
+    """The columns that impacts and reported contacts have in common."""
 
     objects: Any
     points: Array
@@ -72,10 +69,23 @@ class Impulses:
 
 
 @dataclasses.dataclass
-class Contacts(Impulses):
+class Impacts(_Impulses):
+    """Blows that you intend, such as those of a hammer. All N rows belong together; a column that is None has its
+    default.
+
+    `objects` has the struck objects or their handles; one object stands for all rows. `points` (N x 3, metres) and
+    `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
+    seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
+    `time_offsets` are seconds from the step's time to the impact. `second_objects` has the objects that struck, zero
+    for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
+    """
+
+
+@dataclasses.dataclass
+class Contacts(_Impulses):
     """Contacts as an engine reports them, all of one step: `impulses` are over the whole step, also at rest. The
-    daemon separates blows from loads for each pair of object and partner; `partners` are whole numbers from 0 to
-    4294967295 that name the other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound
+    daemon tells impacts from resting contacts for each pair of object and partner; `partners` are whole numbers from 0
+    to 4294967295 that name the other bodies. `travel_speeds` (m/s) with which a contact slides or rolls make it sound
     rough, by `roughness_depth` and `irregularity_length` (metres), as Roughness in contact.proto says."""
 
     partners: Any = None
@@ -85,9 +95,9 @@ class Contacts(Impulses):
 
 
 @dataclasses.dataclass
-class Forces:
-    """Sustained forces, of a simulator that separates loads from blows itself: `forces` (N x 3, newtons) at the
-    step's time. The other columns are those of Contacts."""
+class ContactForces:
+    """Contact forces, of a simulator that separates resting contacts from impacts itself: `forces` (N x 3, newtons) at
+    the step's time. The other columns are those of Contacts."""
 
     objects: Any
     points: Array
@@ -225,26 +235,48 @@ def _pairs(points: Array, vectors: Array, name: str) -> tuple[numpy.ndarray, num
     return places, values
 
 
-def fill_impulse_columns(columns: contact_pb2.ImpulseColumns, given: Impulses) -> int:
-    """Copies the rows into the message and returns their number."""
-    points, impulses = _pairs(given.points, given.impulses, "impulses")
-    count = len(points)
-    append(columns, object=handles_of(given.objects, count), point_m=points, impulse_newton_seconds=impulses)
+def add_contacts(step: contact_pb2.ContactStep, given: Union[_Impulses, ContactForces]) -> int:
+    """Adds contacts of one kind to a step and returns their number."""
+    is_force = isinstance(given, ContactForces)
+    points, vectors = _pairs(given.points, given.forces if isinstance(given, ContactForces) else given.impulses,
+                             "forces" if is_force else "impulses")
+    columns, count = step.contact_columns.add(kind=_kind_of(given)), len(points)
+    append(columns, object=handles_of(given.objects, count), point_m=points,
+           **{"force_newtons" if is_force else "impulse_newton_seconds": vectors})
+    for name, field in NUMBERS.items():
+        values = getattr(given, name, None)
+        if values is not None:
+            append(columns, **{field: _numbers(values, count, name)})
+    if isinstance(given, _Impulses):
+        _fill_collision_columns(columns, given, count)
+    if isinstance(given, Contacts) and given.partners is not None:
+        append(columns, partner=handles_of(given.partners, count, "partners", PARTNER))
+    if isinstance(given, (Contacts, ContactForces)):
+        columns.roughness_depth = given.roughness_depth
+        columns.irregularity_length_m = given.irregularity_length
+    if given.second_objects is not None:
+        _fill_second_columns(columns, given, count)
+    return count
+
+
+def _kind_of(given: Union[_Impulses, ContactForces]) -> contact_pb2.ContactKind:
+    if isinstance(given, Contacts):
+        return contact_pb2.CONTACT_KIND_REPORTED
+    return contact_pb2.CONTACT_KIND_IMPACT if isinstance(given, Impacts) else contact_pb2.CONTACT_KIND_FORCE
+
+
+def _fill_collision_columns(columns: contact_pb2.ContactColumns, given: _Impulses, count: int) -> None:
     if given.durations is not None:
         durations = _numbers(given.durations, count, "durations")
         if (durations < 0).any():
             checks.refuse(durations[durations < 0].tolist()[0], "an entry of durations", DURATION)
         append(columns, duration_s=numpy.where(numpy.isnan(durations), ABSENT, durations))
-    if given.time_offsets is not None:
-        append(columns, time_offset_s=_numbers(given.time_offsets, count, "time_offsets"))
-    if given.second_objects is not None:
-        _fill_second_columns(columns, given, count)
     if given.striker is not None:
         columns.hertz.CopyFrom(to_hertz(given.striker))
-    return count
 
 
-def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impulses, Forces], count: int) -> None:
+def _fill_second_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, ContactForces],
+                         count: int) -> None:
     if given.second_points is None:
         raise ValueError("second_objects without second_points: each contact needs a point on its second object")
     append(columns, second_object=handles_of(given.second_objects, count, "second_objects"),
@@ -253,7 +285,7 @@ def _fill_second_columns(columns: contact_pb2.ImpulseColumns, given: Union[Impul
         append(columns, second_rotation=_rows(given.second_rotations, "second_rotations", 4, count))
 
 
-def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float], struck_by: Striker) -> Impulses:
+def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float], struck_by: Striker) -> Impacts:
     """One strike. Raises ValueError if it has not one point and one impulse, if the impulse is zero, or if the duration
     is negative."""
     if duration is not None and checks.numbers(duration, "duration", DURATION) < 0:
@@ -262,58 +294,15 @@ def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float]
     if not vector_of_impulse.any():
         checks.refuse(impulse, "impulse",
                       f"other than zero, because the strike would be silent: x, y, z, {OBJECT_IMPULSE}")
-    return Impulses(item, checks.three(point, "point", OBJECT_POINT), vector_of_impulse, durations=duration,
-                    striker=struck_by)
-
-
-def add_contacts(step: contact_pb2.ContactStep, given: Contacts) -> int:
-    """Adds an engine's contacts to a step and returns their number."""
-    columns = step.contact_columns
-    count = fill_impulse_columns(columns.impulses, given)
-    if given.partners is not None:
-        append(columns, partner=handles_of(given.partners, count, "partners", PARTNER))
-    if given.travel_speeds is not None:
-        append(columns, travel_speed_m_per_s=_numbers(given.travel_speeds, count, "travel_speeds"))
-    columns.depth = given.roughness_depth
-    columns.irregularity_length_m = given.irregularity_length
-    return count
-
-
-def add_forces(step: contact_pb2.ContactStep, given: Forces) -> int:
-    """Adds sustained forces to a step and returns their number."""
-    points, forces = _pairs(given.points, given.forces, "forces")
-    count = len(points)
-    second = contact_pb2.ImpulseColumns()
-    if given.second_objects is not None:
-        _fill_second_columns(second, given, count)
-    handles = handles_of(given.objects, count)
-    speeds = _numbers(0 if given.travel_speeds is None else given.travel_speeds, count, "travel_speeds")
-    for i in range(count):
-        contact = step.sustained.add(object=int(handles[i]), point_m=vector(points[i]), force_newtons=vector(forces[i]))
-        if speeds[i]:
-            contact.roughness.CopyFrom(contact_pb2.Roughness(
-                travel_speed_m_per_s=speeds[i], depth=given.roughness_depth,
-                irregularity_length_m=given.irregularity_length))
-        if second.second_object and second.second_object[i]:
-            contact.second.CopyFrom(_second_object(second, i))
-    return count
-
-
-def _second_object(columns: contact_pb2.ImpulseColumns, i: int) -> contact_pb2.SecondObject:
-    """Row i of the columns of second objects."""
-    made = contact_pb2.SecondObject(object=columns.second_object[i],
-                                    point_m=vector(columns.second_point_m[3 * i:3 * i + 3]))
-    w, x, y, z = columns.second_rotation[4 * i:4 * i + 4] or (0, 0, 0, 0)
-    if w or x or y or z:
-        made.rotation.CopyFrom(contact_pb2.Quaternion(w=w, x=x, y=y, z=z))
-    return made
+    return Impacts(item, checks.three(point, "point", OBJECT_POINT), vector_of_impulse, durations=duration,
+                   striker=struck_by)
 
 
 def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
     positions = _rows(given.positions, "positions")
-    append(step.pose_columns, object=handles_of(given.objects, len(positions)), position_m=positions)
+    append(step.poses, object=handles_of(given.objects, len(positions)), position_m=positions)
     if given.orientations is not None:
-        append(step.pose_columns, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
+        append(step.poses, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
 
 
 def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:
@@ -337,22 +326,18 @@ def refuse_time(time: float, number: int, before: float, repair: str) -> None:
                                    f"{number}; {repair}")
 
 
-def make_step(time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
-              forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+def make_step(time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
+              forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
               listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
     """Makes the message of the step at a simulation time, seconds."""
     step = contact_pb2.ContactStep(time_s=checks.number(time, "time", "the simulation time in seconds"))
-    for name, given, kind in (("contacts", contacts, Contacts), ("impulses", impulses, Impulses),
-                              ("forces", forces, Forces), ("poses", poses, Poses)):
+    for name, given, kind in (("contacts", contacts, Contacts), ("impacts", impacts, Impacts),
+                              ("forces", forces, ContactForces)):
         if given is not None:
             checks.expect(given, kind, name)
-    if contacts is not None:
-        add_contacts(step, contacts)
-    if impulses is not None:
-        fill_impulse_columns(step.columns, impulses)
-    if forces is not None:
-        add_forces(step, forces)
+            add_contacts(step, given)
     if poses is not None:
+        checks.expect(poses, Poses, "poses")
         add_poses(step, poses)
     if listener is not None:
         step.listener.CopyFrom(to_pose(listener, "listener"))

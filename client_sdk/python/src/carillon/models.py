@@ -107,7 +107,7 @@ class ModelCalls:
         zero means until the sound has died away."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)
-        trace.step(0.0, impulses=strike_of(body, point, impulse, duration, striker))
+        trace.step(0.0, impacts=strike_of(body, point, impulse, duration, striker))
         settings = {"tail_s": seconds, "sample_rate_hz": sample_rate_hz}
         return await rendering.render(self.client, trace, settings)
 

@@ -45,9 +45,9 @@ class ObjectCalls(Generic[AnyStream]):
         """Strikes the object now: the point in metres and the impulse in newton seconds, both in the object's own
         frame; `duration` of the contact in seconds, or the `striker`, such as "wood". Raises CarillonError if the
         strike is refused; a ContactWarning tells of a point that lies far from the object, and the like."""
-        impulses = contacts.strike_of(self, point, impulse, duration, striker)
+        impacts = contacts.strike_of(self, point, impulse, duration, striker)
         stream = self.scene.stream(step=0.001, delay=0)
-        stream.step(0.0, impulses=impulses)
+        stream.step(0.0, impacts=impacts)
         await StreamCalls.close(stream, warn=False)
         if stream.rejection:
             raise stream.rejection
@@ -116,14 +116,12 @@ class SceneCalls(Block, Generic[AnyObject, AnyStream, AnyRecording, AnyTraceReco
     async def add_all(self, objects: Iterable[Mapping[str, Any] | materials.ModelLike | str]) -> list[AnyObject]:
         """Adds all objects, or none if one is refused; `metadata["index"]` of the error is its place. An object is a
         model, or the arguments of `add` by name, such as {"model": bell, "handle": 3, "gain": 0.5}."""
-        requests = []
+        wanted = []
         for i, item in enumerate(objects):
             if isinstance(item, Mapping):
                 checks.refuse_unknown(item, ADD_ARGUMENTS, f"object {i} of add_all")
-            requests.append(self._request(**item) if isinstance(item, Mapping) else self._request(item))
-        request = scene_service_pb2.AddObjectsRequest(scene=self.name, objects=requests)
-        answer = await self.client.ask(self.client.scenes_stub.AddObjects, request)
-        return [self._object_kind(self, item) for item in answer.objects]
+            wanted.append(self._new_object(**item) if isinstance(item, Mapping) else self._new_object(item))
+        return await self._add(wanted)
 
     @call
     async def add(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
@@ -131,15 +129,20 @@ class SceneCalls(Block, Generic[AnyObject, AnyStream, AnyRecording, AnyTraceReco
                   radiation: Optional[materials.Radiation] = None) -> AnyObject:
         """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with.
         `gain` is linear, as in SoundingObject.update."""
-        request = self._request(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
-        return self._object_kind(self, (await self.client.ask(self.client.scenes_stub.AddObject, request)).object)
+        wanted = self._new_object(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
+        return (await self._add([wanted]))[0]
 
-    def _request(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
-                 size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
-                 radiation: Optional[materials.Radiation] = None) -> scene_service_pb2.AddObjectRequest:
+    async def _add(self, wanted: list[scene_service_pb2.NewObject]) -> list[AnyObject]:
+        request = scene_service_pb2.AddObjectsRequest(scene=self.name, objects=wanted)
+        answer = await self.client.ask(self.client.scenes_stub.AddObjects, request)
+        return [self._object_kind(self, item) for item in answer.objects]
+
+    def _new_object(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
+                    size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
+                    radiation: Optional[materials.Radiation] = None) -> scene_service_pb2.NewObject:
         name, message = materials.named(model, material)
-        return checks.message(scene_service_pb2.AddObjectRequest, "add", dict(
-            scene=self.name, modal_model=name, material=message, size=size, gain=gain, handle=handle,
+        return checks.message(scene_service_pb2.NewObject, "add", dict(
+            modal_model=name, material=message, size=size, gain=gain, handle=handle,
             pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation)))
 
     @call

@@ -14,7 +14,7 @@ from typing import Any, Optional, TypeVar
 
 from carillon import checks, contacts, errors
 from carillon.connection import Connection
-from carillon.contacts import Contacts, Forces, Impulses, PoseLike, Poses, make_step
+from carillon.contacts import ContactForces, Contacts, Impacts, PoseLike, Poses, make_step
 from carillon.faces import AwaitedBlock, Block, BlockingBlock, call, finished, iterated
 from carillon.v1 import contact_pb2, contact_service_pb2, warning_pb2
 
@@ -103,12 +103,12 @@ class StreamCalls(Block):
         """How many steps wait for the network."""
         return self._steps.qsize()
 
-    def _put_step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
-                  forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+    def _put_step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
+                  forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
                   listener: Optional[PoseLike] = None) -> None:
-        for columns in (contacts, impulses, forces, poses):
+        for columns in (contacts, impacts, forces, poses):
             _refuse_other_scenes(columns, self._start.scene)
-        self._put(make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener))
+        self._put(make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener))
 
     def _put(self, step: contact_pb2.ContactStep) -> None:
         if self._is_closed:
@@ -154,10 +154,7 @@ class StreamCalls(Block):
         step = await self._next()
         while step is not None:
             steps, following = self._take_waiting(step)
-            if len(steps) > 1:
-                yield contact_service_pb2.StreamContactsRequest(steps=contact_service_pb2.ContactSteps(steps=steps))
-            else:
-                yield contact_service_pb2.StreamContactsRequest(step=step)
+            yield contact_service_pb2.StreamContactsRequest(steps=steps)
             step = following[0] if following else await self._next()
 
     def _take_waiting(self, step: contact_pb2.ContactStep
@@ -212,12 +209,12 @@ class ContactStream(BlockingBlock, StreamCalls):
         self._reader = threading.Thread(target=lambda: finished(self._read()), daemon=True)
         self._reader.start()
 
-    def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
-             forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+    def step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
+             forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
         loads of a simulator that knows them; poses of objects, and of the listener. Errors as those of `send`."""
-        self._put_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener)
+        self._put_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener)
 
     def send(self, step: contact_pb2.ContactStep) -> None:
         """Sends a message of contact.proto. Raises CarillonError if the stream has failed or has been closed
@@ -269,7 +266,7 @@ class AsyncContactStream(AwaitedBlock, StreamCalls):
 AnyStream = TypeVar("AnyStream", ContactStream, AsyncContactStream)
 
 
-def _refuse_other_scenes(columns: Contacts | Impulses | Forces | Poses | None, scene: str) -> None:
+def _refuse_other_scenes(columns: Contacts | Impacts | ContactForces | Poses | None, scene: str) -> None:
     """Raises ValueError for an object of another scene, where its handle may mean another object."""
     for name, other in contacts.scenes_of_objects(columns):
         if other != scene:

@@ -12,7 +12,7 @@ from google.protobuf.message import DecodeError
 from carillon import checks, contacts, materials
 from carillon.columns import varint
 from carillon.contacts import (
-    Contacts, Forces, Impulses, PoseLike, Poses, make_step, refuse_time, scenes_of_objects)
+    ContactForces, Contacts, Impacts, PoseLike, Poses, make_step, refuse_time, scenes_of_objects)
 from carillon.errors import CarillonError
 from carillon.v1 import contact_pb2, contact_trace_pb2, hearing_pb2
 
@@ -21,7 +21,7 @@ FORMAT_VERSION = 1
 
 class Trace:
     """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
-    the simulator's steps in seconds, is needed for all but impulses: by it the daemon knows whether a step was left
+    the simulator's steps in seconds, is needed for all but impacts: by it the daemon knows whether a step was left
     out, and so when a blow is over. A rendering dates each blow as a stream does, which adds its scheduling delay."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
@@ -45,8 +45,8 @@ class Trace:
             pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))))
         return handle
 
-    def step(self, time: float, *, contacts: Optional[Contacts] = None, impulses: Optional[Impulses] = None,
-             forces: Optional[Forces] = None, poses: Optional[Poses] = None,
+    def step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
+             forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
              listener: Optional[PoseLike] = None) -> None:
         """Adds a step, as ContactStream.step sends one. Raises CarillonError (INVALID_STREAM) and adds nothing if the
         time goes back, or is over 1e10 s before or after 0. A trace without a clock can be rendered if its times are 0
@@ -54,9 +54,9 @@ class Trace:
         if not self.header.step_s and any(item is not None for item in (contacts, forces, poses)):
             raise ValueError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a "
                              "stream: Trace(step=1/240)")
-        for columns in (contacts, impulses, forces, poses):
+        for columns in (contacts, impacts, forces, poses):
             _refuse_objects_of_scenes(columns)
-        made = make_step(time, contacts=contacts, impulses=impulses, forces=forces, poses=poses, listener=listener)
+        made = make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener)
         refuse_time(made.time_s, len(self.steps), self.steps[-1].time_s if self.steps else 0,
                     "make another trace for another run")
         self.steps.append(made)

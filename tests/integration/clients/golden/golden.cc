@@ -56,7 +56,7 @@ struct Row {
   std::initializer_list<float> impulse_newton_seconds;
 };
 
-void Add(const Row& row, carillon::v1::ImpulseColumns& columns) {
+void Add(const Row& row, carillon::v1::ContactColumns& columns) {
   columns.add_object(row.object);
   columns.mutable_point_m()->Add(row.point_m.begin(), row.point_m.end());
   columns.mutable_impulse_newton_seconds()->Add(row.impulse_newton_seconds.begin(),
@@ -65,8 +65,10 @@ void Add(const Row& row, carillon::v1::ImpulseColumns& columns) {
 
 carillon::v1::ContactStep Knock() {
   carillon::v1::ContactStep step;
-  Add({1, {0, 0.008F, 0.02F}, {0, 0.125F, -0.25F}}, *step.mutable_columns());
-  step.mutable_columns()->mutable_hertz()->set_striker("wood");
+  carillon::v1::ContactColumns& impacts = *step.add_contact_columns();
+  impacts.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
+  Add({1, {0, 0.008F, 0.02F}, {0, 0.125F, -0.25F}}, impacts);
+  impacts.mutable_hertz()->set_striker("wood");
   return step;
 }
 
@@ -74,13 +76,13 @@ carillon::v1::ContactStep Knock() {
 carillon::v1::ContactStep Slide(int number) {
   carillon::v1::ContactStep step;
   step.set_time_s(number * kStepS);
-  carillon::v1::EngineContactColumns& contacts = *step.mutable_contact_columns();
-  Add({1, {0.125F, 0.016F, 0}, {0, 0, 0.0625F}}, *contacts.mutable_impulses());
-  Add({2, {0.0625F, 0, 0.01F}, {0, static_cast<float>(number) / 256, -0.03125F}},
-      *contacts.mutable_impulses());
+  carillon::v1::ContactColumns& contacts = *step.add_contact_columns();
+  contacts.set_kind(carillon::v1::CONTACT_KIND_REPORTED);
+  Add({1, {0.125F, 0.016F, 0}, {0, 0, 0.0625F}}, contacts);
+  Add({2, {0.0625F, 0, 0.01F}, {0, static_cast<float>(number) / 256, -0.03125F}}, contacts);
   for (const uint32_t partner : {0U, 9U}) contacts.add_partner(partner);
   for (const float speed : {0.0F, 0.5F}) contacts.add_travel_speed_m_per_s(speed);
-  contacts.set_depth(0.25);
+  contacts.set_roughness_depth(0.25);
   contacts.set_irregularity_length_m(0.001);
   return step;
 }
@@ -88,7 +90,8 @@ carillon::v1::ContactStep Slide(int number) {
 carillon::v1::ContactStep Collision() {
   carillon::v1::ContactStep step;
   step.set_time_s(0.5);
-  carillon::v1::ImpulseColumns& columns = *step.mutable_columns();
+  carillon::v1::ContactColumns& columns = *step.add_contact_columns();
+  columns.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
   Add({1, {0.25F, 0, 0.01F}, {0, 0.5F, 0}}, columns);
   columns.add_duration_s(0.0009765625F);
   columns.add_time_offset_s(0.0078125F);

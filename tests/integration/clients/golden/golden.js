@@ -14,13 +14,13 @@ function makeTrace(model) {
   trace.add(model, { material: 'chime_aluminum', radiation: 'paper_coupling', label: 'low', size: 2 });
   trace.add(model, { material: 'chime_aluminum', radiation: 'paper_coupling', label: 'high', gain: 0.5,
     pose: { position: [1, 0, 0.5], orientation: [0, 0, 1, 0] } });
-  trace.step(0, { impulses: { objects: 1, points: [0, 0.008, 0.02], impulses: [0, 0.125, -0.25], striker: 'wood' } });
+  trace.step(0, { impacts: { objects: 1, points: [0, 0.008, 0.02], impulses: [0, 0.125, -0.25], striker: 'wood' } });
   for (let i = 1; i <= 16; i += 1) {
     trace.step(i * STEP_S, { contacts: { objects: [1, 2], points: [[0.125, 0.016, 0], [0.0625, 0, 0.01]],
       impulses: Float32Array.of(0, 0, 0.0625, 0, i / 256, -0.03125), partners: [0, 9], travelSpeeds: [0, 0.5],
       roughnessDepth: 0.25, irregularityLength: 0.001 } });
   }
-  trace.step(0.5, { impulses: { objects: 1, points: [0.25, 0, 0.01], impulses: [0, 0.5, 0], durations: 0.0009765625,
+  trace.step(0.5, { impacts: { objects: 1, points: [0.25, 0, 0.01], impulses: [0, 0.5, 0], durations: 0.0009765625,
     timeOffsets: 0.0078125, secondObjects: 2, secondPoints: [0, 0, 0] } });
   return trace;
 }

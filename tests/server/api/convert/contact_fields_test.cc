@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/api/convert/column_conversion.h"
+#include "server/api/convert/contact_fields.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,10 +33,12 @@ class NoTarget final : public EventTarget {
 
 Told Read(const v1::ContactStep& step) {
   Told told;
-  for (int row = 0; row < step.columns().object_size() && Validate(step.columns()).ok(); ++row) {
-    ReadRow(step.columns(), row, told.impulses.emplace_back());
+  for (const v1::ContactColumns& columns : step.contact_columns()) {
+    for (int row = 0; row < columns.object_size() && Validate(columns).ok(); ++row) {
+      ReadRow(columns, row, told.impulses.emplace_back());
+    }
   }
-  const v1::PoseColumns& poses = step.pose_columns();
+  const v1::PoseColumns& poses = step.poses();
   for (int row = 0; row < poses.object_size() && Validate(poses).ok(); ++row) {
     told.poses.push_back(ReadRow(poses, row));
   }
@@ -54,10 +56,11 @@ void Append(Column* column, std::initializer_list<float> numbers) {
   for (const float number : numbers) column->Add(number);
 }
 
-/// Three impulses of which two have a second object.
+/// Three impacts of which two have a second object.
 v1::ContactStep ThreeImpulses() {
   v1::ContactStep step;
-  v1::ImpulseColumns& columns = *step.mutable_columns();
+  v1::ContactColumns& columns = *step.add_contact_columns();
+  columns.set_kind(v1::CONTACT_KIND_IMPACT);
   for (const uint32_t second : {7U, 0U, 8U}) {
     columns.add_object(1);
     Append(columns.mutable_point_m(), {1, 2, 3});
@@ -73,7 +76,7 @@ v1::ContactStep ThreeImpulses() {
 
 v1::ContactStep TwoPoses() {
   v1::ContactStep step;
-  v1::PoseColumns& columns = *step.mutable_pose_columns();
+  v1::PoseColumns& columns = *step.mutable_poses();
   columns.add_object(1);
   columns.add_object(2);
   for (const double x : {1.0, 2.0, 3.0, 4.0, 5.0, 6.0}) columns.add_position_m(x);
@@ -97,7 +100,7 @@ TEST(Columns, AContactHasASecondObjectWhereItsHandleIsNotZero) {
 
 TEST(Columns, WhatMayBeEmptyIsNone) {
   v1::ContactStep step = ThreeImpulses();
-  v1::ImpulseColumns& columns = *step.mutable_columns();
+  v1::ContactColumns& columns = *step.mutable_contact_columns(0);
   columns.clear_second_rotation();
   EXPECT_FALSE(Read(step).impulses[0].contact.second->rotation.has_value());
   columns.clear_second_object();
@@ -117,15 +120,15 @@ TEST(Columns, PosesAreTurnedWhereTheColumnSaysSo) {
   EXPECT_EQ(told.poses[1].position_m, (Vector3{4, 5, 6}));
   EXPECT_EQ(told.poses[0].orientation.x, 1);
   EXPECT_EQ(told.poses[1].orientation.w, 1);
-  step.mutable_pose_columns()->clear_orientation();
+  step.mutable_poses()->clear_orientation();
   EXPECT_EQ(Read(step).poses[0].orientation.w, 1);
 }
 
 TEST(Columns, AColumnOfAnotherLengthRejectsAllImpulsesAndIsNamed) {
   const auto expect = [](absl::string_view name, uint64_t rejected_count,
-                         const std::function<void(v1::ImpulseColumns&)>& spoil) {
+                         const std::function<void(v1::ContactColumns&)>& spoil) {
     v1::ContactStep step = ThreeImpulses();
-    spoil(*step.mutable_columns());
+    spoil(*step.mutable_contact_columns(0));
     const Told told = Read(step);
     EXPECT_TRUE(told.impulses.empty());
     EXPECT_EQ(told.rejected_count, rejected_count) << name;
@@ -141,40 +144,90 @@ TEST(Columns, AColumnOfAnotherLengthRejectsAllImpulsesAndIsNamed) {
   expect("second_point_m", 5, [](auto& columns) { columns.clear_second_point_m(); });
   expect("second_rotation", 5, [](auto& columns) { columns.add_second_rotation(1); });
   expect("second_point_m", 3, [](auto& columns) { columns.clear_second_object(); });
+  expect("partner", 5, [](auto& columns) { columns.add_partner(1); });
+  expect("travel_speed_m_per_s", 5, [](auto& columns) { columns.add_travel_speed_m_per_s(1); });
+  expect("force_newtons", 5, [](auto& columns) {
+    columns.set_kind(v1::CONTACT_KIND_FORCE);
+    columns.clear_impulse_newton_seconds();
+  });
 }
 
 TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
   v1::ContactStep step = TwoPoses();
-  step.mutable_pose_columns()->add_orientation(0);
+  step.mutable_poses()->add_orientation(0);
   const Told turned = Read(step);
   EXPECT_EQ(turned.rejected_count, 2U);
   EXPECT_THAT(turned.rejection, HasSubstr("COLUMNS_MISMATCHED: the column orientation has 9"));
-  step.mutable_pose_columns()->add_position_m(0);
+  step.mutable_poses()->add_position_m(0);
   EXPECT_THAT(Read(step).rejection, HasSubstr("the column position_m has 7"));
-  step.mutable_pose_columns()->clear_object();
+  step.mutable_poses()->clear_object();
   EXPECT_EQ(Read(step).rejected_count, 1U);
 }
 
 TEST(Columns, ARejectionNamesItsRowUnlessThereIsOneOnly) {
   v1::ContactStep step = ThreeImpulses();
-  EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: columns[2]: an empty scene has "
+  EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: impacts[2]: an empty scene has "
                                               "no object 1, which is unknown"));
-  *step.mutable_contact_columns()->mutable_impulses() = step.columns();
-  step.clear_columns();
-  EXPECT_THAT(Read(step).rejection, HasSubstr("contact_columns[2]: an empty scene"));
-  EXPECT_THAT(Read(TwoPoses()).rejection, HasSubstr("pose_columns[1]: "));
+  step.mutable_contact_columns(0)->clear_kind();
+  EXPECT_THAT(Read(step).rejection, HasSubstr("contacts[2]: an empty scene"));
+  EXPECT_THAT(Read(TwoPoses()).rejection, HasSubstr("poses[1]: "));
   v1::ContactStep rows;
-  rows.add_impulses()->set_object(1);
-  EXPECT_THAT(Read(rows).rejection, HasSubstr("LOCATION_MISSING: a contact"));
-  rows.add_impulses()->set_object(2);
+  rows.add_contacts()->set_object(1);
+  EXPECT_THAT(Read(rows).rejection, HasSubstr("CONTACT_MALFORMED: a contact"));
+  rows.add_contacts()->set_object(2);
   EXPECT_THAT(Read(rows).rejection,
-              HasSubstr("LOCATION_MISSING: impulses[1]: a contact on object 2"));
+              HasSubstr("CONTACT_MALFORMED: contacts[1]: a contact on object 2"));
 }
 
-TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
-  v1::EngineContactColumns columns;
-  *columns.mutable_impulses() = ThreeImpulses().columns();
-  columns.set_depth(0.4);
+/// A row with a point and with the vectors that are named.
+v1::ContactStep Row(v1::ContactKind kind, bool has_impulse, bool has_force) {
+  v1::ContactStep step;
+  v1::Contact& row = *step.add_contacts();
+  row.set_kind(kind);
+  row.set_object(1);
+  row.mutable_point_m();
+  if (has_impulse) row.mutable_impulse_newton_seconds()->set_x(1);
+  if (has_force) row.mutable_force_newtons()->set_x(1);
+  return step;
+}
+
+TEST(Rows, NeedTheVectorOfTheirKind) {
+  for (const auto kind : {v1::CONTACT_KIND_UNSPECIFIED, v1::CONTACT_KIND_REPORTED,
+                          v1::CONTACT_KIND_IMPACT, v1::CONTACT_KIND_FORCE}) {
+    const bool is_force = kind == v1::CONTACT_KIND_FORCE;
+    EXPECT_THAT(Read(Row(kind, !is_force, is_force)).rejection, HasSubstr("OBJECT_NOT_FOUND"));
+    EXPECT_THAT(Read(Row(kind, is_force, !is_force)).rejection, HasSubstr("CONTACT_MALFORMED"));
+    EXPECT_THAT(Read(Row(kind, false, false)).rejection, HasSubstr("CONTACT_MALFORMED"));
+  }
+}
+
+TEST(Contacts, OfAKindThatThisDaemonDoesNotKnowAreRejected) {
+  const auto unknown = static_cast<v1::ContactKind>(9);
+  EXPECT_THAT(Read(Row(unknown, true, false)).rejection, HasSubstr("knows no kind 9"));
+  v1::ContactStep step = ThreeImpulses();
+  step.mutable_contact_columns(0)->set_kind(unknown);
+  EXPECT_EQ(Read(step).rejected_count, 5U);
+}
+
+TEST(Columns, WithTheVectorsOfAnotherKindAreRejected) {
+  v1::ContactStep step = ThreeImpulses();
+  v1::ContactColumns& columns = *step.mutable_contact_columns(0);
+  columns.set_kind(v1::CONTACT_KIND_FORCE);
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: contact forces have"));
+  columns.mutable_force_newtons()->Swap(columns.mutable_impulse_newton_seconds());
+  EXPECT_TRUE(Validate(columns).ok());
+  ObjectForce force;
+  ReadRow(columns, 0, force);
+  EXPECT_EQ(force.contact.impulse.impulse_newton_seconds, (Vector3{4, 5, 6}));
+  columns.set_kind(v1::CONTACT_KIND_REPORTED);
+  EXPECT_THAT(Validate(columns).ToString(),
+              HasSubstr("COLUMNS_MISMATCHED: contacts with impulses"));
+}
+
+TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
+  v1::ContactColumns columns = ThreeImpulses().contact_columns(0);
+  columns.set_kind(v1::CONTACT_KIND_REPORTED);
+  columns.set_roughness_depth(0.4);
   for (const uint32_t partner : {4U, 5U, 6U}) {
     columns.add_partner(partner);
     columns.add_travel_speed_m_per_s(static_cast<float>(partner) / 2);
@@ -191,21 +244,21 @@ TEST(ColumnConversion, EngineContactsHaveTheColumnsOfImpulsesAndTheirOwn) {
   columns.mutable_partner()->RemoveLast();
   EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: the column partner"));
   v1::ContactStep step;
-  *step.mutable_contact_columns() = columns;
+  *step.add_contact_columns() = columns;
   EXPECT_EQ(Read(step).rejected_count, 5U);  // three objects and two second ones
 }
 
 TEST(ColumnConversion, ADurationBelowZeroIsAbsentAndAStrikerHoldsForAll) {
   v1::ContactStep step = ThreeImpulses();
-  step.mutable_columns()->set_duration_s(1, -1);
-  step.mutable_columns()->set_duration_s(2, 0);
+  step.mutable_contact_columns(0)->set_duration_s(1, -1);
+  step.mutable_contact_columns(0)->set_duration_s(2, 0);
   const Told told = Read(step);
   EXPECT_FLOAT_EQ(static_cast<float>(told.impulses[0].contact.impulse.duration_s.value()), 0.001F);
   EXPECT_EQ(told.impulses[1].contact.impulse.duration_s, std::nullopt);
   EXPECT_EQ(told.impulses[2].contact.impulse.duration_s, 0);
-  step.mutable_columns()->clear_duration_s();
+  step.mutable_contact_columns(0)->clear_duration_s();
   EXPECT_EQ(Read(step).impulses[2].contact.impulse.duration_s, std::nullopt);
-  step.mutable_columns()->mutable_hertz()->set_striker("stel");
+  step.mutable_contact_columns(0)->mutable_hertz()->set_striker("stel");
   EXPECT_THAT(Read(step).rejection, HasSubstr("UNKNOWN_STRIKER"));
   EXPECT_THAT(Read(step).rejection, HasSubstr("the nearest is steel"));
 }
