@@ -4,10 +4,13 @@
 CARILLON_JOBS says how many (500 is the whole campaign), CARILLON_SEED repeats one.
 """
 
+import functools
+import importlib.util
 import os
 import pathlib
 import random
 import statistics
+import subprocess
 import tempfile
 import threading
 import time
@@ -18,7 +21,7 @@ import scripted
 from carillon.v1 import audio_service_pb2, contact_pb2, decomposition_pb2
 from carillon.v1 import decomposition_service_pb2, error_pb2, material_pb2, modal_model_pb2
 from carillon.v1 import scene_service_pb2
-from daemon import Daemon
+from daemon import ROOT, Daemon
 from google.protobuf.internal.encoder import _VarintBytes
 
 JOB_COUNT = int(os.environ.get("CARILLON_JOBS", "24"))
@@ -48,8 +51,20 @@ esac
 """
 
 
+@functools.cache
+def worker_messages():
+    """The messages of workers, which no client has."""
+    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+        subprocess.run(["protoc", "-I", ROOT / "proto", f"--python_out={folder}", "carillon/worker/v1/worker.proto"],
+                       check=True)
+        described = importlib.util.spec_from_file_location("worker_pb2", f"{folder}/carillon/worker/v1/worker_pb2.py")
+        module = importlib.util.module_from_spec(described)
+        described.loader.exec_module(module)
+        return module
+
+
 def event(**fields):
-    message = decomposition_pb2.WorkerEvent(**fields).SerializeToString()
+    message = worker_messages().WorkerEvent(**fields).SerializeToString()
     return _VarintBytes(len(message)) + message
 
 

@@ -12,7 +12,6 @@
 whose `reason` programs can act upon.
 """
 
-from carillon import forks  # before gRPC is imported
 from carillon import aio
 from carillon.address import default_server
 from carillon.client import Client, connect

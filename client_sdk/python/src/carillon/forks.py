@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs that fork, such as those with a Pool of multiprocessing. gRPC keeps its threads in order over a fork only if
-a variable of the environment says so when it is imported; this module is therefore imported before gRPC."""
+a variable of the environment says so when it is imported. With it, gRPC learns only at the next call that a connection
+has ended, so that the first call after a restart of the daemon fails: the program that forks has to ask for it."""
 
 from __future__ import annotations
 
 import os
-import sys
 import weakref
 from typing import Protocol
 
 VARIABLE = "GRPC_ENABLE_FORK_SUPPORT"
 
-if "grpc" not in sys.modules:
-    os.environ.setdefault(VARIABLE, "1")
 _is_supported = os.environ.get(VARIABLE, "").lower() in ("1", "true", "yes", "y")
 
 
@@ -35,8 +33,8 @@ def open_in_children(connection: Connection) -> None:
 def refuse() -> None:
     """Raises RuntimeError where calls of gRPC would never end."""
     if _is_lost:
-        raise RuntimeError("this process was forked by one that had imported grpc before carillon, so that its calls "
-                           f"would not end; import carillon first, set {VARIABLE}=1, or start processes by "
+        raise RuntimeError(f"this process was forked by one that was started without {VARIABLE}=1, so that its calls "
+                           "would not end: set that variable before the program starts, or start processes by "
                            'multiprocessing.set_start_method("spawn")')
 
 
