@@ -51,7 +51,9 @@ struct RoundTripTest : ::testing::Test {
     return {std::istreambuf_iterator<char>(file), {}};
   }
 
-  const std::string path = testing::TempDir() + "round_trip.model";
+  // The tests of a program run side by side.
+  const std::string path =
+      testing::TempDir() + testing::UnitTest::GetInstance()->current_test_info()->name() + ".model";
 };
 
 TEST_F(RoundTripTest, KeepsEveryFigureOfAModelAndItsOrigin) {
