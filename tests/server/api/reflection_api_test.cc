@@ -70,13 +70,13 @@ TEST_F(ReflectionTest, ListsEveryService) {
   for (const auto& service : answer.list_services_response().service()) {
     names.push_back(service.name());
   }
-  EXPECT_THAT(names,
-              UnorderedElementsAre("carillon.v1.AdminService", "carillon.v1.AudioService",
-                                   "carillon.v1.ContactService", "carillon.v1.DecompositionService",
-                                   "carillon.v1.JobRunService", "carillon.v1.ModalModelService",
-                                   "carillon.v1.SceneService", "carillon.v1.ServerService",
-                                   "grpc.health.v1.Health", "grpc.reflection.v1.ServerReflection",
-                                   "grpc.reflection.v1alpha.ServerReflection"));
+  EXPECT_THAT(names, UnorderedElementsAre(
+                         "carillon.v1.AdminService", "carillon.v1.AudioService",
+                         "carillon.v1.ContactService", "carillon.v1.DecompositionService",
+                         "carillon.worker.v1.JobRunService", "carillon.v1.ModalModelService",
+                         "carillon.v1.SceneService", "carillon.v1.ServerService",
+                         "grpc.health.v1.Health", "grpc.reflection.v1.ServerReflection",
+                         "grpc.reflection.v1alpha.ServerReflection"));
   EXPECT_TRUE(reflected.End().ok());
 }
 
@@ -117,7 +117,7 @@ TEST_F(ReflectionTest, AnswersTheOlderVersionToo) {
   const auto stub = v1alpha::ServerReflection::NewStub(channel());
   const auto stream = stub->ServerReflectionInfo(&context);
   v1alpha::ServerReflectionRequest request;
-  request.set_file_containing_symbol("carillon.v1.Impulse");
+  request.set_file_containing_symbol("carillon.v1.Contact");
   v1alpha::ServerReflectionResponse response;
   ASSERT_TRUE(stream->Write(request));
   ASSERT_TRUE(stream->Read(&response));
@@ -129,11 +129,11 @@ TEST_F(ReflectionTest, SaysWhatIsNotThere) {
   EXPECT_EQ(reflected.AskForSymbol("carillon.v1.Nothing").error_response().error_code(),
             grpc::StatusCode::NOT_FOUND);
   reflection::ServerReflectionRequest request;
-  request.mutable_file_containing_extension()->set_containing_type("carillon.v1.Impulse");
+  request.mutable_file_containing_extension()->set_containing_type("carillon.v1.Contact");
   EXPECT_EQ(reflected.Ask(request).error_response().error_code(), grpc::StatusCode::NOT_FOUND);
-  request.set_all_extension_numbers_of_type("carillon.v1.Impulse");
+  request.set_all_extension_numbers_of_type("carillon.v1.Contact");
   EXPECT_EQ(reflected.Ask(request).all_extension_numbers_response().base_type_name(),
-            "carillon.v1.Impulse");
+            "carillon.v1.Contact");
   EXPECT_EQ(reflected.Ask({}).error_response().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
