@@ -42,14 +42,14 @@ constexpr std::string_view kHarmless[] = {"KHR_materials_",
                                           "CESIUM_primitive_outline"};
 
 std::string WayOut(std::string_view extension) {
-  if (extension.find("meshopt") != extension.npos) {
+  if (extension.find("meshopt") != std::string_view::npos) {
     return "decompress it (\"gltfpack -i IN -o OUT -noq\"), or export the body again uncompressed";
   }
-  if (extension.find("draco") != extension.npos) {
+  if (extension.find("draco") != std::string_view::npos) {
     return "re-export the body uncompressed (in Blender leave \"Compression\" off; "
            "\"gltf-pipeline -i IN -o OUT\" decompresses a file)";
   }
-  if (extension.find("instancing") != extension.npos) {
+  if (extension.find("instancing") != std::string_view::npos) {
     return "write its instances as nodes (\"gltf-transform uninstance IN OUT\")";
   }
   return "export the body again without it";
@@ -113,7 +113,8 @@ std::string DecodeUri(const std::string& uri) {
   }
   const size_t comma = uri.find(',');
   std::string bytes;
-  if (comma == uri.npos || !absl::EndsWith(absl::string_view(uri).substr(0, comma), ";base64") ||
+  if (comma == std::string_view::npos ||
+      !absl::EndsWith(absl::string_view(uri).substr(0, comma), ";base64") ||
       !absl::Base64Unescape(absl::string_view(uri).substr(comma + 1), &bytes)) {
     FailGltf("the data of a buffer is not in base64");
   }

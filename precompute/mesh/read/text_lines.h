@@ -100,7 +100,8 @@ std::optional<T> ToNumber(std::string_view word) {
   if (error == std::errc::result_out_of_range) {
     // A number between zero and the least above it is zero.
     if constexpr (std::is_floating_point_v<T>) {
-      const bool is_small = word.find("e-") != word.npos || word.find("E-") != word.npos;
+      const bool is_small =
+          word.find("e-") != std::string_view::npos || word.find("E-") != std::string_view::npos;
       return is_small ? 0 : HUGE_VAL;
     }
   }
