@@ -175,7 +175,7 @@ absl::StatusOr<std::unique_ptr<EventStream>> Mixer::OpenStream(size_t capacity, 
 }
 
 absl::StatusOr<BusId> Mixer::OpenBus(double gain) {
-  const absl::StatusOr<BusId> id = owner_.OpenBus();
+  absl::StatusOr<BusId> id = owner_.OpenBus();
   if (!id.ok()) return id;
   Bus& bus = *buses_[id->index];
   bus.gain = static_cast<float>(gain);
