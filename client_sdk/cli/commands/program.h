@@ -25,9 +25,7 @@ struct Program {
   bool json = false;
   std::function<absl::Status()> command;
 
-  std::unique_ptr<client::Client> Daemon() const {
-    return client::Connect(server, Connection());
-  }
+  std::unique_ptr<client::Client> Daemon() const { return client::Connect(server, Connection()); }
 
   client::ConnectOptions Connection() const {
     return {.tls_roots_pem = ForTls(tls_roots_file),

@@ -26,8 +26,8 @@ inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 /// answers for it.
 inline constexpr auto kHealthTimeout = std::chrono::seconds(10);
 
-/// Opens the connection to a daemon. $http_proxy is for other machines: a proxy could not reach this
-/// one's loopback addresses.
+/// Opens the connection to a daemon. $http_proxy is for other machines: a proxy could not reach
+/// this one's loopback addresses.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const ConnectOptions& options);
 

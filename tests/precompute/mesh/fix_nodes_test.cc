@@ -37,7 +37,7 @@ class FixNodesTest : public ReadMeshTest {
  protected:
   /// The nodes fixed of a body read from a file, a surface filled with quadratic elements.
   TetMesh Fixed(const std::string& bytes, const std::string& format,
-               const std::vector<Fixture>& fixtures) {
+                const std::vector<Fixture>& fixtures) {
     absl::StatusOr<NamedMesh> named = ReadNamed(bytes, format);
     EXPECT_TRUE(named.ok()) << named.status();
     TetMesh mesh;
@@ -102,10 +102,10 @@ TEST_F(FixNodesTest, VertexHoldsItsNode) {
       const TetMesh mesh = Fixed(bytes, format, {FixedVertices{{static_cast<int64_t>(v)}}});
       ASSERT_TRUE(status.ok()) << status;
       EXPECT_EQ(mesh.fixed, NodesWhere(mesh,
-                                      [&](const Point& p) {
-                                        return Near(p[0], at[0]) && Near(p[1], at[1]) &&
-                                               Near(p[2], at[2]);
-                                      }))
+                                       [&](const Point& p) {
+                                         return Near(p[0], at[0]) && Near(p[1], at[1]) &&
+                                                Near(p[2], at[2]);
+                                       }))
           << format << v;
     }
   }
@@ -133,9 +133,10 @@ TEST_F(FixNodesTest, VerticesOfTetrahedraHaveTheNumbersOfTheFile) {
   const TetMesh mesh = Fixed(ToTextGmsh(box), "msh", {FixedVertices{{11, 20}}});
   EXPECT_THAT(mesh.fixed, ::testing::ElementsAre(0, 9));
   Fixed(ToTextGmsh(box), "msh", {FixedVertices{{10}}});
-  EXPECT_THAT(status.ToString(),
-              HasSubstr("NO_VERTEX_FIXED: no node of the body is fixed by vertex 10: the numbers of "
-                        "the file go from 11 to 55"));
+  EXPECT_THAT(
+      status.ToString(),
+      HasSubstr("NO_VERTEX_FIXED: no node of the body is fixed by vertex 10: the numbers of "
+                "the file go from 11 to 55"));
 }
 
 TEST_F(FixNodesTest, VerticesOfAFormatThatNumbersNoneAreRefused) {
