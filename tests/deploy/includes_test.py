@@ -36,7 +36,7 @@ class Includes(TreeTest):
         self.write("server/daemon/main.cc", '#include "carillon/client.h"\n')
         self.assert_found(
             check_includes.check(self.root),
-            "server/daemon/main.cc:1: server may not include client_sdk/cpp/include/carillon/client.h",
+            "server/daemon/main.cc:1: server/daemon may not include client_sdk/cpp/include/carillon/client.h",
             "grpc (grpcpp/channel.h) may appear in")
 
     def test_the_inside_of_the_sdk_is_refused_to_its_users(self):
