@@ -15,9 +15,10 @@ constexpr uint64_t kMib = uint64_t{1} << 20U;
 
 /// A folder with files as the system has them for control groups.
 class UsableMemory : public testing::Test {
- protected:
+ public:
   ~UsableMemory() override { std::filesystem::remove_all(folder_); }
 
+ protected:
   /// Writes a file, and makes its folders.
   void Write(const std::string& path, const std::string& content) const {
     std::filesystem::create_directories((folder_ / path).parent_path());

@@ -91,6 +91,7 @@ TEST_F(ModelLoadingTest, AModelThatIsBeingReadKeepsOnlyItsOwnReadersWaiting) {
 
 TEST_F(ModelLoadingTest, AModelIsSharedByAllWhoLoadItAtTheSameTime) {
   std::vector<std::future<std::shared_ptr<const ModalModel>>> loads;
+  loads.reserve(4);
   for (int i = 0; i < 4; ++i) {
     loads.push_back(std::async(std::launch::async, [&] { return *database_->models().Find(a_); }));
   }
