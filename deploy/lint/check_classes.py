@@ -14,7 +14,7 @@ MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?
 APART = {
     "server/mode_database/model_collection.cc",
     "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
-    "client_sdk/cpp/internal/grpc_client_runs.cc", "client_sdk/cpp/internal/grpc_client_streams.cc",
+    "client_sdk/cpp/internal/grpc_client_streams.cc",
 }
 
 

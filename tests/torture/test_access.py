@@ -15,7 +15,6 @@ import time
 import unittest
 
 import grpc
-from google.protobuf import descriptor_pool
 
 import carillon
 import torture

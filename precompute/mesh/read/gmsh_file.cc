@@ -61,7 +61,7 @@ class GmshParser {
     return is_41_ ? Read41(&Gmsh41Sections::ReadElements) : ReadElements();
   }
 
-  /// Passes over what is left of a section. The format lets readers ignore sections that they do
+  /// Passes over the rest of a section. The format lets readers ignore sections that they do
   /// not know, but the nodes and elements must end where their numbers say.
   absl::Status EndSection(std::string_view section) {
     const std::string end = "$End" + std::string(section.substr(1));
