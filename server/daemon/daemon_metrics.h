@@ -23,7 +23,7 @@ struct MeasuredRooms {
   ApiServer& server;
 };
 
-/// Returns the present values of the daemon's metrics, which docs/operations.md lists.
+/// Returns the present values of the daemon's metrics, which docs/run.md lists.
 std::vector<Metric> ReadMetrics(const MeasuredRooms& rooms);
 
 }  // namespace carillon

@@ -24,7 +24,7 @@ absl::Status Damaged(absl::string_view what) {
       absl::StrCat(
           "the database file is damaged, or the disk under it fails (", what,
           "): see the system's log; then stop the daemon, and run carillond db restore, or "
-          "recover the file with sqlite3 as docs/operations.md describes"));
+          "recover the file with sqlite3 as docs/troubleshoot.md describes"));
 }
 
 absl::Status NobodyWaits() { return absl::CancelledError("nobody waits for the copy any more"); }

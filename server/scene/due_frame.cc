@@ -29,9 +29,9 @@ void TimeMapper::Note(double time_s, uint64_t frame) {
   ++step_count_;
   const auto run_frames = static_cast<double>(frame - *since_frame_);
   if (step_count_ < kFewestLateSteps || run_frames < kLateRunS * sample_rate_hz_) return;
-  const double grains =
+  const double block_count =
       std::ceil((late_frames + mapping_.delay_s * sample_rate_hz_) / double{kOfflineBlockFrames});
-  mapping_.first_frame += static_cast<uint64_t>(grains) * kOfflineBlockFrames;
+  mapping_.first_frame += static_cast<uint64_t>(block_count) * kOfflineBlockFrames;
   since_frame_.reset();
   ++remap_count_;
 }

@@ -52,7 +52,7 @@ class MetricsTest(unittest.TestCase):
         self.assertEqual(named - metrics_of_daemon(), set())
 
     def test_the_page_for_operators_lists_every_metric(self):
-        page = (ROOT / "docs/operations.md").read_text()
+        page = (ROOT / "docs/run.md").read_text()
         self.assertEqual(metrics_of_daemon() - set(re.findall(r"`([a-z_]+)`", page)), set())
 
 

@@ -40,8 +40,8 @@ def line_of(name, roles):
 
 
 def documented_roles():
-    """The table of docs/operations.md: the role of each method."""
-    page = (ROOT / "docs/operations.md").read_text()
+    """The table of docs/limits_and_access.md: the role of each method."""
+    page = (ROOT / "docs/limits_and_access.md").read_text()
     rows = re.findall(r"^\| `(\w+)`( \(private\))? \| (.+) \| (\w+|its run's token) \|$", page, re.MULTILINE)
     return {f"/carillon.{'worker.' if private else ''}v1.{service}/{method}": role
             for service, private, methods, role in rows for method in re.findall(r"`(\w+)`", methods)}
@@ -288,7 +288,7 @@ class AccessTest(unittest.TestCase):
         self.assertRegex(self.refused_start(*tls, "--tls-client-roots", old), "TLS_UNUSABLE: .*expired")
 
     def test_the_documented_command_makes_a_token_that_all_clients_can_show(self):
-        page = (ROOT / "docs/operations.md").read_text()
+        page = (ROOT / "docs/limits_and_access.md").read_text()
         script = re.search(r"```sh\n(token=.*?)```", page, re.DOTALL).group(1)
         script = script.replace("/etc/carillon/access", str(self.access))
         token = subprocess.run(["sh", "-euc", script], check=True, capture_output=True, text=True).stdout.strip()

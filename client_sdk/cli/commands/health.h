@@ -9,7 +9,7 @@
 
 namespace carillon::cli {
 
-/// Whether the daemon or one of its services is SERVING, as docs/operations.md describes it.
+/// Whether the daemon or one of its services is SERVING, as docs/troubleshoot.md describes it.
 struct ServiceHealth {
   std::string name;  ///< "carillond" for the whole daemon
   std::string cure;  ///< what to do if it does not serve

@@ -227,7 +227,7 @@ export class SoundingObject {
   remove(): Promise<void>;
 }
 
-/** A scene of the daemon. It lasts until it is deleted. */
+/** A scene of the daemon. Without `keep` it ends a minute after the last connection that used it is closed. */
 export class Scene {
   constructor(client: Client, name: string, existing?: boolean);
   readonly name: string;

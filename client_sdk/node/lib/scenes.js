@@ -68,7 +68,10 @@ class SoundingObject {
   }
 }
 
-/** A scene of the daemon. It lasts until it is deleted. `existing`: it was there before its createScene with an id. */
+/**
+ * A scene of the daemon. Without `keep` it ends a minute after the last connection that used it is closed. `existing`:
+ * it was there before its createScene with an id.
+ */
 class Scene {
   constructor(client, name, existing = false) {
     this.client = client;

@@ -11,7 +11,7 @@
 
 namespace carillon {
 
-/// The rights that a caller can have. docs/operations.md lists the calls of each role.
+/// The rights that a caller can have. docs/limits_and_access.md lists the calls of each role.
 enum class Role : unsigned {
   kAny = 0,  ///< satisfied by any other role
   kListen = 1,

@@ -59,7 +59,8 @@ struct OscillatorBankSettings {
 /// An impulse J adds -i c_m g_m / omega_m exp(i phase_m) exp(s_m^2 tau^2 / 2) to Z_m at its time,
 /// with g_m = sum_v w_v phi_m(v) . J and s_m = sigma_m + i omega_m. The last factor is that of a
 /// Gaussian pulse, and is exact once the contact is over (where sigma^2 > omega^2, exp(-|s_m|^2
-/// tau^2 / 2) replaces it). A raised cosine has another factor (strike_kernel::Onset).
+/// tau^2 / 2) replaces it). The default pulse is a raised cosine, which has another factor in its
+/// place (strike_kernel::Onset).
 ///
 /// A struck mode rings in the time domain, SIMD across modes: in single precision within a block,
 /// in double between blocks, which keeps the error below -100 dB. At the start of the next long

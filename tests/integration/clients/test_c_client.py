@@ -129,7 +129,7 @@ class CClientTest(DaemonTest):
                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as striker:
                 heard.take(2.0)
                 said = striker.communicate("\n")[0]
-            self.assertEqual((striker.returncode, said), (0, "strikes sounded: 1\n"))
+            self.assertEqual((striker.returncode, said), (0, "strikes in time: 1\n"))
             self.assertGreater(heard.sound.peak, 1e-4)
         failed = subprocess.run([self.folder / "strike", "none.obj"], env=environment, check=False,
                                 stdin=subprocess.DEVNULL, capture_output=True, text=True)

@@ -90,7 +90,7 @@ class InstalledClientTest(DaemonTest):
         (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```$", page)[1])
         (self.folder / "bowl.obj").write_bytes(meshes.bowl())
         said = self.bash(f"{COMPILE_C}CARILLON_SERVER={self.daemon.server} ./strike bowl.obj </dev/null")
-        self.assertEqual(said.stdout, "strikes sounded: 1\n")
+        self.assertEqual(said.stdout, "strikes in time: 1\n")
 
     def test_an_older_minor_version_is_not_taken_for_this_one(self):
         project = self.folder / "older"

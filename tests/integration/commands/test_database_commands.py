@@ -211,14 +211,14 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.daemon.start()
 
     def test_what_sqlite_can_read_is_recovered(self):
-        """By the commands of docs/operations.md for a damaged file without a backup."""
+        """By the commands of docs/troubleshoot.md for a damaged file without a backup."""
         self.import_copies(20)
         self.daemon.stop()
         data = self.folder / "data"
         file = data / "carillon.db"
         os.truncate(file, file.stat().st_size * 3 // 4)
         self.assertEqual(self.offline("check").returncode, 1)
-        page = (ROOT / "docs/operations.md").read_text()
+        page = (ROOT / "docs/troubleshoot.md").read_text()
         repair = page[page.index("### Repair"):]
         commands = [line.strip() for line in repair[:repair.index("    carillond")].splitlines() if line[:4] == "    "]
         self.assertEqual(commands.pop(0), "cd /var/lib/carillon")

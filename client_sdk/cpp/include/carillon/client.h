@@ -63,9 +63,9 @@ class Client {
   virtual absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo() const;
 
   /// Returns whether a service, such as "carillon.v1.AudioService", is SERVING after the daemon's
-  /// health (grpc.health.v1); docs/operations.md has the services and what keeps each from serving.
-  /// The empty name is the whole daemon. Needs no token. Returns DEADLINE_EXCEEDED (SERVER_TIMEOUT)
-  /// after 10 seconds.
+  /// health (grpc.health.v1); docs/troubleshoot.md has the services and what keeps each from
+  /// serving. The empty name is the whole daemon. Needs no token. Returns DEADLINE_EXCEEDED
+  /// (SERVER_TIMEOUT) after 10 seconds.
   virtual absl::StatusOr<bool> IsServing(const std::string& service) const;
 
   // Modal models.
@@ -96,7 +96,7 @@ class Client {
   absl::StatusOr<std::vector<v1::ModalModelSummary>> ListModalModels(
       const v1::ListModalModelsRequest& filter = {}) const;
 
-  /// Changes the label, the tags or the pin of a model.
+  /// Changes the label, the tags, the pin or the material of a model.
   virtual absl::StatusOr<v1::ModalModelSummary> UpdateModalModel(
       const v1::UpdateModalModelRequest& request) const;
 
@@ -181,7 +181,8 @@ class Client {
   /// itself a minute after the connections that have used it.
   virtual absl::Status DeleteScene(const std::string& name) const;
 
-  /// Returns all scenes of the daemon, the oldest first.
+  /// Returns the scenes of the caller, the oldest first: all of the daemon if it has no access
+  /// file, or if the caller is an administrator.
   virtual absl::StatusOr<std::vector<v1::Scene>> ListScenes() const;
 
   /// Returns the objects of a scene by their handles.
