@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the package for Node of this folder: the modules, the contract, and the types of its messages.
+"""Makes the package for Node of this folder: the modules, the adapters of engines, the contract, and the types of its
+messages.
 
 Usage: pack.py NODE_MODULES FOLDER
 
@@ -45,6 +46,9 @@ def make_folder(modules, package):
     """Copies what package.json calls the files of the package, and generates the types."""
     package.mkdir()
     shutil.copytree(HERE / "lib", package / "lib")
+    (package / "adapters").mkdir()
+    for file in (ROOT / "client_sdk/adapters").glob("*.js"):
+        shutil.copy(file, package / "adapters")
     for file in (HERE / "package.json", HERE / "README.md", ROOT / "LICENSE"):
         shutil.copy(file, package)
     shutil.copytree(ROOT / "proto/carillon", package / "proto/carillon")

@@ -59,6 +59,13 @@ class DistributionTest(unittest.TestCase):
         self.assert_prints("SERVER_UNAVAILABLE", "node", "--input-type=module", "-e",
                            f"import {{ connect }} from 'carillon'; {code}")
 
+    def test_it_has_the_adapters_of_engines(self):
+        adapters = sorted(path.stem for path in (ROOT / "client_sdk/adapters").glob("*_contacts.js"))
+        self.assertIn("rapier_contacts", adapters)
+        for adapter in adapters:
+            self.assert_prints("function", "node", "-p",
+                               f"typeof Object.values(require('carillon/adapters/{adapter}'))[0]")
+
     def test_a_package_that_cannot_be_made_is_refused_in_a_sentence(self):
         pack = ROOT / "client_sdk/node/pack.py"
         for expected, *arguments in (("Usage: pack.py NODE_MODULES FOLDER",),
