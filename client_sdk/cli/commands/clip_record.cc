@@ -90,6 +90,7 @@ std::string RecordLine(const ClipRecord& record) {
                {"sha256", record.sound.digest},
                {"trace_sha256", record.trace_digest},
                {"settings", Json::parse(record.settings)}};
+  if (!record.labels.empty()) json["labels"] = record.labels;
   json.update(SoundJson(record));
   json["objects"] = Json::array();
   for (size_t i = 0; i < record.objects.size(); ++i) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct ClipRecord {
   std::string settings;      ///< SettingsText
   ClipFile sound;
   double factor = 1;  ///< by which the samples were multiplied
+  std::map<std::string, std::string> labels;  ///< of the trace's author
   std::vector<v1::ContactTraceObject> objects;
   std::vector<ClipFile> stems;  ///< one for each object, or none
   v1::RenderSummary summary;

@@ -43,7 +43,7 @@ class ClipRenderer {
     record.settings = settings_;
     ASSIGN_OR_RETURN(record.trace_digest, FileDigest(trace));
     if (IsRendered(folder_.Final(""), record)) return false;
-    ASSIGN_OR_RETURN(record.objects, ReadObjects(trace));
+    RETURN_IF_ERROR(ReadHead(trace, record));
     RETURN_IF_ERROR(RenderSound(trace, record));
     const std::string stems = absl::StrCat(clip, ".stems");
     for (const v1::ContactTraceObject& object : record.objects) {
@@ -66,13 +66,14 @@ class ClipRenderer {
     return (fs::path(options_.trace) / absl::StrCat(clip, ".contacts")).string();
   }
 
-  static absl::StatusOr<std::vector<v1::ContactTraceObject>> ReadObjects(const std::string& path) {
+  /// Reads the labels and the objects of a trace.
+  static absl::Status ReadHead(const std::string& path, ClipRecord& clip) {
     ASSIGN_OR_RETURN(client::ContactTraceReader trace, client::ContactTraceReader::Open(path));
-    std::vector<v1::ContactTraceObject> objects;
+    clip.labels = {trace.header().labels().begin(), trace.header().labels().end()};
     while (true) {
       ASSIGN_OR_RETURN(const std::optional<v1::ContactTraceRecord> record, trace.Next());
-      if (!record || !record->has_object()) return objects;
-      objects.push_back(record->object());
+      if (!record || !record->has_object()) return absl::OkStatus();
+      clip.objects.push_back(record->object());
     }
   }
 

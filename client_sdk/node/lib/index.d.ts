@@ -197,8 +197,10 @@ export class Model {
 
 /** A recorded simulation. */
 export class Trace {
-  /** `step`, seconds, is needed for contacts, forces and poses, as in a stream. */
-  constructor(settings?: StreamSettings & { step?: number; simulator?: string; hearing?: Hearing; listener?: Pose });
+  /** `step`, seconds, is needed for contacts, forces and poses, as in a stream. `labels` are text of your own. */
+  constructor(settings?: StreamSettings & {
+    step?: number; simulator?: string; hearing?: Hearing; listener?: Pose; labels?: Record<string, string>;
+  });
   header: ContactTraceHeader;
   objects: ContactTraceObject[];
   steps: ContactStep[];

@@ -3,7 +3,7 @@
 
 const fs = require('fs/promises');
 const util = require('util');
-const { choice, counted, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
+const { choice, counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { given, makeStep, objectsOf, present, refuseTime, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError } = require('./errors');
@@ -21,14 +21,18 @@ function streamSettings({ frame, pulseShape }) {
  * A recorded simulation: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
  * the simulator's steps in seconds, is needed for all but impacts: by it the daemon knows whether a step was left out,
  * and so when a blow is over. A rendering then dates each blow as a stream does, which adds its scheduling delay.
+ * `labels` are text of your own by name, which `carillon render` copies into the record of the sound.
  */
 class Trace {
   constructor(own = {}) {
-    refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape'], 'Trace');
-    const { step, simulator, hearing, listener, ...settings } = own;
+    refuseUnknown(own, ['step', 'simulator', 'hearing', 'listener', 'frame', 'pulseShape', 'labels'], 'Trace');
+    const { step, simulator, hearing, listener, labels, ...settings } = own;
     refuseNoNumbers({ step }, 'Trace');
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
-    this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step }),
+    for (const [name, text] of Object.entries(labels ?? {})) {
+      if (typeof text !== 'string') refuse(text, `the label ${name} of Trace`, 'text');
+    }
+    this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step, labels }),
       ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')), ...streamSettings(settings) };
     this.objects = [];
     this.steps = [];

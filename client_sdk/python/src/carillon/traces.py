@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, BinaryIO, Optional
 
 from google.protobuf.message import DecodeError
@@ -22,15 +22,17 @@ FORMAT_VERSION = 1
 class Trace:
     """A trace in memory: `header`, `objects` and `steps` are the messages of contact_trace.proto. `step`, the length of
     the simulator's steps in seconds, is needed for all but impacts: by it the daemon knows whether a step was left
-    out, and so when a blow is over. A rendering dates each blow as a stream does, which adds its scheduling delay."""
+    out, and so when a blow is over. A rendering dates each blow as a stream does, which adds its scheduling delay.
+    `labels` are text of your own by name, such as {"class": "glass"}, which `carillon render` copies into the record
+    of the sound."""
 
     def __init__(self, step: float = 0, *, simulator: str = "", hearing: Optional[hearing_pb2.Hearing] = None,
                  listener: Optional[PoseLike] = None, frame: Optional[contacts.Frame] = None,
-                 pulse_shape: Optional[contacts.PulseShape] = None):
+                 pulse_shape: Optional[contacts.PulseShape] = None, labels: Optional[Mapping[str, str]] = None):
         self.header = contact_trace_pb2.ContactTraceHeader(
             format_version=FORMAT_VERSION, simulator=simulator, step_s=step, hearing=hearing,
             listener=None if listener is None else contacts.to_pose(listener, "listener"),
-            frame=contacts.to_frame(frame), pulse_shape=contacts.to_pulse_shape(pulse_shape))
+            frame=contacts.to_frame(frame), pulse_shape=contacts.to_pulse_shape(pulse_shape), labels=labels)
         self.objects: list[contact_trace_pb2.ContactTraceObject] = []
         self.steps: list[contact_pb2.ContactStep] = []
 
