@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client_sdk/interchange/gltf_accessor.h"
-#include "client_sdk/interchange/gltf_document.h"
 #include "client_sdk/interchange/gltf_extension.h"
 #include "client_sdk/interchange/gltf_model.h"
+#include "client_sdk/interchange/gltf_writer.h"
 #include "client_sdk/interchange/header_json.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
@@ -116,7 +115,7 @@ json MaterialOf(const v1::Material& material, const std::string& name) {
 }
 
 json ModelOf(const StoredModel& model, const std::vector<SoundingMode>& modes,
-             double density_kg_per_m3, AccessorWriter& arrays) {
+             double density_kg_per_m3, GltfWriter& arrays) {
   json result = {{"frequencies", arrays.Add(Each(modes, &SoundingMode::frequency_hz), "SCALAR")},
                  {"decayRates", arrays.Add(Each(modes, &SoundingMode::decay_per_s), "SCALAR")},
                  {"positions", arrays.Add(model.vertices, "VEC3")},
@@ -128,8 +127,8 @@ json ModelOf(const StoredModel& model, const std::vector<SoundingMode>& modes,
   return result;
 }
 
-json MeshOf(const StoredModel& model, AccessorWriter& arrays) {
-  using enum AccessorWriter::Target;
+json MeshOf(const StoredModel& model, GltfWriter& arrays) {
+  using enum GltfWriter::Target;
   const size_t positions = arrays.Add(model.given_vertices, "VEC3", kVertices);
   json primitive = {{"attributes", {{"POSITION", positions}}},
                     {"indices", arrays.Add(model.given_triangles, kIndices)}};
@@ -155,7 +154,7 @@ absl::Status WriteGltfModel(const std::string& path, const StoredModel& model,
     return Refusal(absl::StatusCode::kFailedPrecondition, "NO_MODE_IN_BAND",
                    "the material overdamps every mode; name one with less damping");
   }
-  AccessorWriter arrays;
+  GltfWriter arrays;
   json extension = {
       {"acousticMaterials", json::array({MaterialOf(material, names.material)})},
       {"modalModels", json::array({ModelOf(model, modes, material.density_kg_per_m3(), arrays)})}};
@@ -170,10 +169,8 @@ absl::Status WriteGltfModel(const std::string& path, const StoredModel& model,
                 {"scene", 0},
                 {"scenes", json::array({{{"nodes", json::array({0})}}})},
                 {"nodes", json::array({std::move(node)})},
-                {"meshes", json::array({std::move(mesh)})},
-                {"accessors", arrays.accessors()},
-                {"bufferViews", arrays.views()}};
-  return WriteGltf(path, std::move(asset), arrays.bytes(), binary);
+                {"meshes", json::array({std::move(mesh)})}};
+  return arrays.Write(path, std::move(asset), binary);
 }
 
 }  // namespace carillon::interchange

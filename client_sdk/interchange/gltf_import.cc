@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client_sdk/interchange/chosen_model.h"
 #include "client_sdk/interchange/complete_model.h"
 #include "client_sdk/interchange/damping.h"
 #include "client_sdk/interchange/file_refusal.h"
-#include "client_sdk/interchange/gltf_accessor.h"
-#include "client_sdk/interchange/gltf_document.h"
 #include "client_sdk/interchange/gltf_extension.h"
+#include "client_sdk/interchange/gltf_json.h"
 #include "client_sdk/interchange/gltf_model.h"
-#include "client_sdk/interchange/gltf_nodes.h"
 #include "client_sdk/interchange/gltf_surface.h"
 #include "client_sdk/interchange/header_json.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/gltf/gltf_document.h"
 #include "proto/cpp/limits.h"
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/utf8.h"
@@ -53,6 +56,9 @@ absl::Status Check(const GltfModes& modes) {
     return Malformed(absl::StrCat("there are ", modes.mode_count(), " frequencies, but ",
                                   modes.decay_rates_per_s.size(), " decay rates"));
   }
+  if (modes.mode_count() == 0 || modes.point_count() == 0 || modes.indices.size() % 3 != 0) {
+    return Malformed("there is no mode, no position, or a triangle with fewer than three corners");
+  }
   // Each count fits in memory, so that their product does not overflow.
   if (modes.shapes.size() / 3 != modes.mode_count() * modes.point_count()) {
     return Malformed(absl::StrCat("there are ", modes.shapes.size() / 3,
@@ -70,22 +76,28 @@ absl::Status Check(const GltfModes& modes) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<GltfModes> ReadModes(GltfDocument& file, const json& model) {
-  GltfModes modes;
-  const auto read = [&](const char* name, const char* type, std::vector<float>& numbers) {
-    ASSIGN_OR_RETURN(numbers, ReadFloats(file, Member(model, name), name, type));
-    return absl::OkStatus();
-  };
-  for (const absl::Status& status :
-       {read("frequencies", "SCALAR", modes.frequencies_hz),
-        read("decayRates", "SCALAR", modes.decay_rates_per_s),
-        read("positions", "VEC3", modes.positions), read("shapes", "VEC3", modes.shapes)}) {
-    if (!status.ok()) return status;
+/// Calls `read`, and names the array of the model in its fault.
+template <class Read>
+auto Named(const char* name, Read read) {
+  try {
+    return read();
+  } catch (const GltfFault& fault) {
+    throw GltfFault(absl::StrCat("\"", name, "\": ", fault.what()));
   }
+}
+
+absl::StatusOr<GltfModes> ReadModes(const GltfDocument& file, const json& model) {
+  const auto read = [&](const char* name, const char* type) {
+    return Named(name, [&] { return file.Read<float>(Member(model, name), type); });
+  };
+  GltfModes modes = {.frequencies_hz = read("frequencies", "SCALAR"),
+                     .decay_rates_per_s = read("decayRates", "SCALAR"),
+                     .positions = read("positions", "VEC3"),
+                     .shapes = read("shapes", "VEC3"),
+                     .indices = {}};
   if (const json& indices = Member(model, "indices"); !indices.is_null()) {
-    ASSIGN_OR_RETURN(std::vector<uint32_t> found, ReadIndices(file, indices, "indices"));
-    RETURN_IF_ERROR(CheckTriangles(found, modes.point_count()));
-    modes.indices = std::move(found);
+    modes.indices =
+        Named("indices", [&] { return file.ReadIndices(indices, modes.point_count()); });
   }
   RETURN_IF_ERROR(Check(modes));
   return modes;
@@ -179,8 +191,9 @@ void SetModes(const GltfModes& modes, const std::vector<DampedMode>& damped,
 /// Reads the sounding surface: the triangles between the sample points or, without them, the mesh
 /// of the node, each vertex of which moves like the nearest sample point, as the draft demands.
 /// Returns the sample point of each vertex.
-absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const ChosenModel& chosen,
-                                                 const GltfModes& modes, StoredModel& model) {
+absl::StatusOr<std::vector<uint32_t>> SetSurface(const GltfDocument& file,
+                                                 const ChosenModel& chosen, const GltfModes& modes,
+                                                 StoredModel& model) {
   std::vector<uint32_t> points(modes.point_count());
   std::iota(points.begin(), points.end(), 0U);
   if (!modes.indices.empty()) {
@@ -191,7 +204,7 @@ absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const Chose
       return Incomplete("the modal model has sample points without triangles, and its node no mesh",
                         "store the triangles as the model's indices");
     }
-    ASSIGN_OR_RETURN(GltfSurface mesh, ReadMesh(file, *chosen.mesh));
+    ASSIGN_OR_RETURN(MeshSurface mesh, ReadMesh(file, *chosen.mesh));
     if (!AllFinite(mesh.vertices)) return Malformed("a vertex of the mesh is not finite");
     points = NearestPoints(modes.positions, mesh.vertices);
     model.vertices = std::move(mesh.vertices);
@@ -203,17 +216,22 @@ absl::StatusOr<std::vector<uint32_t>> SetSurface(GltfDocument& file, const Chose
 
 /// Reads the surface as given if Carillon wrote the file and no program has changed it since;
 /// otherwise leaves it out.
-void SetGivenSurface(GltfDocument& file, const ChosenModel& chosen, StoredModel& model) {
+void SetGivenSurface(const GltfDocument& file, const ChosenModel& chosen, StoredModel& model) {
   const json& ours = Member(Member(Member(*chosen.model, "extras"), "carillon"), "givenTriangle");
   if (ours.is_null() || !chosen.mesh) return;
-  absl::StatusOr<std::vector<uint32_t>> lies_on = ReadIndices(file, ours, "givenTriangle");
-  absl::StatusOr<GltfSurface> mesh = ReadMesh(file, *chosen.mesh);
-  if (!lies_on.ok() || !mesh.ok() || !AllFinite(mesh->vertices)) return;
-  if (lies_on->size() != model.triangle_count()) return;
-  if (std::ranges::max(*lies_on) >= mesh->triangles.size() / 3) return;
-  model.given_triangle = *std::move(lies_on);
-  model.given_vertices = std::move(mesh->vertices);
-  model.given_triangles = std::move(mesh->triangles);
+  try {
+    absl::StatusOr<MeshSurface> mesh = ReadMesh(file, *chosen.mesh);
+    if (!mesh.ok() || !AllFinite(mesh->vertices)) return;
+    std::vector<uint32_t> lies_on = file.ReadIndices(ours, mesh->triangles.size() / 3);
+    if (lies_on.size() != model.triangle_count()) return;
+    model.given_triangle = std::move(lies_on);
+    model.given_vertices = std::move(mesh->vertices);
+    model.given_triangles = std::move(mesh->triangles);
+  } catch (const GltfFault&) {
+    return;
+  } catch (const json::exception&) {
+    return;
+  }
   for (float& x : model.given_vertices) x = static_cast<float>(x * chosen.metres_per_unit);
 }
 
@@ -248,7 +266,12 @@ v1::ModalModelHeader HeaderOf(const GltfDocument& file, const ChosenModel& chose
 
 absl::StatusOr<GltfModel> ReadWhole(const std::string& path, const std::string& pick,
                                     const v1::Material& material) {
-  ASSIGN_OR_RETURN(GltfDocument file, GltfDocument::Read(path));
+  const std::optional<std::string> bytes = BytesOfFile(path);
+  if (!bytes) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(path, " cannot be read; check its name and its permissions"));
+  }
+  const GltfDocument file(*bytes, std::filesystem::path(path).parent_path());
   ASSIGN_OR_RETURN(const ChosenModel chosen, ChooseModel(file, pick));
   ASSIGN_OR_RETURN(const GltfModes modes, ReadModes(file, *chosen.model));
   ASSIGN_OR_RETURN(v1::Material resolved, MaterialOf(file, *chosen.model, material));
@@ -273,6 +296,10 @@ absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::stri
     return ReadWhole(path, pick, material);
   } catch (const std::bad_alloc&) {
     return OutOfMemory(path);
+  } catch (const GltfFault& fault) {
+    return GltfRefusal("MODEL_FILE_MALFORMED", fault);
+  } catch (const json::exception& fault) {
+    return GltfRefusal("MODEL_FILE_MALFORMED", fault);
   }
 }
 

@@ -7,33 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/interchange/file_refusal.h"
-#include "client_sdk/interchange/gltf_accessor.h"
-#include "proto/cpp/status_macros.h"
+#include "proto/cpp/gltf/gltf_surface.h"
 
 namespace carillon::interchange {
 namespace {
 
 using nlohmann::json;
-
-constexpr uint64_t kTriangles = 4;  // the mode of a primitive, by glTF's numbers
-
-absl::Status Append(GltfDocument& file, const json& primitive, GltfSurface& surface) {
-  const json& mode = Member(primitive, "mode");
-  if (!mode.is_null() && Whole(mode) != kTriangles) return absl::OkStatus();
-  const json& position = Member(Member(primitive, "attributes"), "POSITION");
-  ASSIGN_OR_RETURN(const std::vector<float> vertices,
-                   ReadFloats(file, position, "POSITION", "VEC3"));
-  std::vector<uint32_t> triangles(vertices.size() / 3);
-  std::iota(triangles.begin(), triangles.end(), 0U);
-  if (const json& indices = Member(primitive, "indices"); !indices.is_null()) {
-    ASSIGN_OR_RETURN(triangles, ReadIndices(file, indices, "indices of the mesh"));
-  }
-  RETURN_IF_ERROR(CheckTriangles(triangles, vertices.size() / 3));
-  const auto first = static_cast<uint32_t>(surface.vertices.size() / 3);
-  for (const uint32_t vertex : triangles) surface.triangles.push_back(first + vertex);
-  surface.vertices.insert(surface.vertices.end(), vertices.begin(), vertices.end());
-  return absl::OkStatus();
-}
 
 double SquaredDistance(const float* a, const float* b) {
   const double x = double{a[0]} - b[0], y = double{a[1]} - b[1], z = double{a[2]} - b[2];
@@ -66,28 +45,18 @@ uint32_t Nearest(const std::vector<float>& points, const std::vector<uint32_t>& 
 
 }  // namespace
 
-absl::StatusOr<GltfSurface> ReadMesh(GltfDocument& file, uint64_t mesh) {
-  const json& meshes = Member(file.root(), "meshes");
-  if (!meshes.is_array() || mesh >= meshes.size())
-    return Malformed(absl::StrCat("there is no mesh ", mesh));
-  GltfSurface surface;
-  const json& primitives = Member(meshes[mesh], "primitives");
-  for (const json& primitive : primitives.is_array() ? primitives : json::array()) {
-    RETURN_IF_ERROR(Append(file, primitive, surface));
+absl::StatusOr<MeshSurface> ReadMesh(const GltfDocument& file, uint64_t mesh) {
+  MeshSurface whole;
+  for (const json& primitive : file.At("meshes", mesh).at("primitives")) {
+    const GltfSurface part = ReadPrimitive(file, primitive, json());
+    const auto first = static_cast<uint32_t>(whole.vertices.size() / 3);
+    for (const uint32_t vertex : part.corners) whole.triangles.push_back(first + vertex);
+    for (const GltfPoint& point : part.points) {
+      for (const double x : point) whole.vertices.push_back(static_cast<float>(x));
+    }
   }
-  if (!surface.triangles.empty()) return surface;
+  if (!whole.triangles.empty()) return whole;
   return Incomplete(absl::StrCat("mesh ", mesh, " has no triangles"), "store it as triangles");
-}
-
-absl::Status CheckTriangles(const std::vector<uint32_t>& triangles, size_t vertex_count) {
-  if (triangles.empty() || triangles.size() % 3 != 0) {
-    return Malformed(
-        absl::StrCat("triangles have three corners each, not ", triangles.size(), " in all"));
-  }
-  const uint32_t most = std::ranges::max(triangles);
-  if (most < vertex_count) return absl::OkStatus();
-  return Malformed(
-      absl::StrCat("a triangle names vertex ", most, ", but there are ", vertex_count));
 }
 
 std::vector<uint32_t> NearestPoints(const std::vector<float>& points,

@@ -27,8 +27,7 @@ absl::StatusOr<SurfaceFile> ParseSurface(const std::string& bytes, const std::st
   if (format == "off") return ParseOff(bytes);
   if (format == "ply") return ParsePly(bytes);
   if (format == "stl") return ParseStl(bytes);
-  if (format == "glb") return ParseGlb(bytes);
-  if (format == "gltf") return ParseGltf(bytes);
+  if (format == "glb" || format == "gltf") return ParseGltf(bytes);
   return absl::InternalError(absl::StrCat("no reader of surfaces for the format ", format));
 }
 

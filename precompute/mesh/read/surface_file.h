@@ -52,8 +52,7 @@ absl::StatusOr<SurfaceFile> ParseObj(const std::string& bytes);
 absl::StatusOr<SurfaceFile> ParseOff(const std::string& bytes);
 absl::StatusOr<SurfaceFile> ParsePly(const std::string& bytes);
 absl::StatusOr<SurfaceFile> ParseStl(const std::string& bytes);
-/// All data of the document must be embedded in it.
+/// Reads text and binary. All data of the document must be embedded in it.
 absl::StatusOr<SurfaceFile> ParseGltf(const std::string& bytes);
-absl::StatusOr<SurfaceFile> ParseGlb(const std::string& bytes);
 
 }  // namespace carillon::precompute

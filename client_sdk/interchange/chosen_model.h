@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "client_sdk/interchange/gltf_document.h"
+#include "proto/cpp/gltf/gltf_document.h"
 
 namespace carillon::interchange {
 
@@ -23,7 +23,7 @@ struct ChosenModel {
 
 /// Chooses a model by the `pick` of ReadGltfModel. Errors: InvalidArgument (MODEL_FILE_INCOMPLETE:
 /// there is no such model; MODEL_FILE_AMBIGUOUS: there are several, or the nodes of the model
-/// differ in scale; MODEL_FILE_MALFORMED).
+/// differ in scale; MODEL_FILE_MALFORMED). Throws a GltfFault if the tree of nodes is damaged.
 absl::StatusOr<ChosenModel> ChooseModel(const GltfDocument& file, const std::string& pick);
 
 }  // namespace carillon::interchange
