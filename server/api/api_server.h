@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/api/edge/tls_files.h"
+#include "server/api/edge/access/tls_files.h"
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/remote_runs.h"
+#include "server/decomposition/worker/remote_runs.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"

@@ -5,7 +5,7 @@
 #include "server/api/api_server.h"
 #include "server/daemon/data_directory.h"
 #include "server/daemon/options.h"
-#include "server/decomposition/local_executor.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "server/live_output/live_output.h"
 
 namespace carillon {

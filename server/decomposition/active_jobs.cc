@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/decomposition/job_rules.h"
+#include "server/decomposition/job/job_rules.h"
 
 namespace carillon {
 namespace {

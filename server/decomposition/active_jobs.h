@@ -15,11 +15,11 @@
 #include "server/base/clock.h"
 #include "server/base/mutex.h"
 #include "server/decomposition/fair_queue.h"
+#include "server/decomposition/job/memory_estimate.h"
 #include "server/decomposition/job_machine.h"
 #include "server/decomposition/job_places.h"
 #include "server/decomposition/job_sink.h"
 #include "server/decomposition/job_watchers.h"
-#include "server/decomposition/memory_estimate.h"
 #include "server/decomposition/watcher.h"
 
 namespace carillon {

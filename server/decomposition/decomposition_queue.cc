@@ -8,11 +8,11 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/decomposition/coarse_request.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/job_rules.h"
+#include "server/decomposition/job/coarse_request.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/job/job_rules.h"
+#include "server/decomposition/job/stored_model.h"
 #include "server/decomposition/queue_refusals.h"
-#include "server/decomposition/stored_model.h"
 
 namespace carillon {
 namespace {

@@ -14,14 +14,14 @@
 #include "carillon/v1/modal_model_service.pb.h"
 #include "server/base/clock.h"
 #include "server/decomposition/active_jobs.h"
-#include "server/decomposition/executor.h"
+#include "server/decomposition/job/executor.h"
+#include "server/decomposition/job/wanted_job.h"
 #include "server/decomposition/job_events.h"
 #include "server/decomposition/job_journal.h"
 #include "server/decomposition/job_runs.h"
 #include "server/decomposition/job_sink.h"
 #include "server/decomposition/job_watch.h"
 #include "server/decomposition/queue_settings.h"
-#include "server/decomposition/wanted_job.h"
 #include "server/mode_database/mode_database.h"
 
 namespace carillon {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "server/decomposition/job/memory_estimate.h"
 #include "server/decomposition/job_events.h"
 #include "server/decomposition/job_wishes.h"
-#include "server/decomposition/memory_estimate.h"
 #include "server/mode_database/job_store.h"
 #include "server/mode_database/mode_database.h"
 

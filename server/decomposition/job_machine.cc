@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/decomposition/job_rules.h"
-#include "server/decomposition/worker_command.h"
+#include "server/decomposition/job/job_rules.h"
+#include "server/decomposition/worker/worker_command.h"
 
 namespace carillon {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "carillon/v1/decomposition.pb.h"
 #include "carillon/v1/modal_model_service.pb.h"
-#include "server/decomposition/executor.h"
+#include "server/decomposition/job/executor.h"
 #include "server/decomposition/job_wishes.h"
 #include "server/mode_database/job_store.h"
 

@@ -8,10 +8,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "server/decomposition/job_rules.h"
-#include "server/decomposition/memory_estimate.h"
-#include "server/decomposition/stored_model.h"
-#include "server/decomposition/wanted_job.h"
+#include "server/decomposition/job/job_rules.h"
+#include "server/decomposition/job/memory_estimate.h"
+#include "server/decomposition/job/stored_model.h"
+#include "server/decomposition/job/wanted_job.h"
 
 namespace carillon {
 namespace {

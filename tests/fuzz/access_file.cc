@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "server/api/edge/access_table.h"
+#include "server/api/edge/access/access_table.h"
 #include "tests/fuzz/memory_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -3,7 +3,7 @@
 
 #include "absl/status/statusor.h"
 #include "precompute/mesh/mesh_names.h"
-#include "precompute/mesh/read/element_file.h"
+#include "precompute/mesh/read/elements/element_file.h"
 
 namespace carillon::precompute {
 

@@ -12,7 +12,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/surface_file.h"
-#include "precompute/mesh/read/text_lines.h"
+#include "precompute/mesh/read/text/text_lines.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/call/call_events.h"
 
-#include "server/api/edge/peer_name.h"
+#include "server/api/edge/access/peer_name.h"
 
 namespace carillon {
 namespace {

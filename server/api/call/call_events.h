@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "server/api/edge/access_table.h"
+#include "server/api/edge/access/access_table.h"
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/base/limited_events.h"

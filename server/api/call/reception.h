@@ -8,7 +8,7 @@
 #include "server/api/call/call_events.h"
 #include "server/api/call/stream_call.h"
 #include "server/api/call/thread_pool.h"
-#include "server/api/edge/access_control.h"
+#include "server/api/edge/access/access_control.h"
 #include "server/api/edge/client_limits.h"
 
 namespace carillon {

@@ -27,9 +27,9 @@
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
+#include "server/api/edge/access/guess_limiter.h"
+#include "server/api/edge/access/peer_name.h"
 #include "server/api/edge/client_limits.h"
-#include "server/api/edge/guess_limiter.h"
-#include "server/api/edge/peer_name.h"
 
 namespace carillon {
 namespace {

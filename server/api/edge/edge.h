@@ -14,13 +14,13 @@
 
 #include "absl/status/status.h"
 #include "absl/types/span.h"
-#include "server/api/edge/certificate_end.h"
+#include "server/api/edge/access/certificate_end.h"
+#include "server/api/edge/access/tls_credentials.h"
+#include "server/api/edge/access/tls_files.h"
 #include "server/api/edge/connection_gate.h"
 #include "server/api/edge/flood_guard.h"
 #include "server/api/edge/grpc_servers.h"
 #include "server/api/edge/listen_address.h"
-#include "server/api/edge/tls_credentials.h"
-#include "server/api/edge/tls_files.h"
 #include "server/base/limited_log.h"
 
 namespace carillon {

@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "server/api/edge/access_control.h"
+#include "server/api/edge/access/access_control.h"
 #include "server/api/edge/client_limits.h"
 #include "server/api/edge/scene_leases.h"
 #include "server/base/mutex.h"

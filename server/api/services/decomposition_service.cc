@@ -16,7 +16,7 @@
 #include "server/api/call/unary_call.h"
 #include "server/api/convert/resource_name.h"
 #include "server/base/mutex.h"
-#include "server/decomposition/job_rules.h"
+#include "server/decomposition/job/job_rules.h"
 
 namespace carillon {
 namespace {

@@ -4,8 +4,8 @@
 #include "carillon/worker/v1/job_run_service.grpc.pb.h"
 #include "server/api/call/raw_service.h"
 #include "server/api/call/thread_pool.h"
-#include "server/api/edge/access_control.h"
-#include "server/decomposition/remote_runs.h"
+#include "server/api/edge/access/access_control.h"
+#include "server/decomposition/worker/remote_runs.h"
 
 namespace carillon {
 

@@ -15,7 +15,7 @@
 #include "server/api/convert/object_conversion.h"
 #include "server/api/convert/resource_name.h"
 #include "server/api/services/model_streams.h"
-#include "server/decomposition/stored_model.h"
+#include "server/decomposition/job/stored_model.h"
 #include "server/scene/sounding_object.h"
 
 namespace carillon {

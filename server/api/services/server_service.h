@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "carillon/v1/server_service.grpc.pb.h"
-#include "server/api/edge/certificate_end.h"
+#include "server/api/edge/access/certificate_end.h"
 #include "server/base/clock.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/live_output/live_output.h"

@@ -8,7 +8,7 @@
 
 #include "server/api/api_server.h"
 #include "server/base/mutex.h"
-#include "server/decomposition/local_executor.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "server/live_output/live_output.h"
 #include "tests/server/mode_database/sample_model.h"
 

@@ -12,7 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "carillon/v1/admin_service.grpc.pb.h"
-#include "server/api/edge/call_name.h"
+#include "server/api/edge/access/call_name.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {

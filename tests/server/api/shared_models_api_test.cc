@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/decomposition/decomposition_request.h"
+#include "server/decomposition/job/decomposition_request.h"
 #include "tests/server/api/served_daemon.h"
 #include "tests/server/mode_database/sample_transfer.h"
 

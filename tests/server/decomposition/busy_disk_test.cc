@@ -11,10 +11,10 @@
 #include <mutex>
 #include <vector>
 
-#include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/local_executor.h"
+#include "server/decomposition/job/coarse_request.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "server/mode_database/sqlite_connection.h"
 #include "tests/server/decomposition/scripted_worker.h"
 #include "tests/server/mode_database/faulty_vfs.h"

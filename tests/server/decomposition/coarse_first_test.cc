@@ -9,10 +9,10 @@
 #include <mutex>
 
 #include "proto/cpp/mesh_format.h"
-#include "server/decomposition/coarse_request.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/local_executor.h"
+#include "server/decomposition/job/coarse_request.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "tests/server/decomposition/scripted_worker.h"
 
 namespace carillon {

@@ -3,7 +3,7 @@
 
 #include "proto/cpp/error_reason.h"
 #include "server/base/sha256.h"
-#include "server/decomposition/worker_command.h"
+#include "server/decomposition/worker/worker_command.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {

@@ -2,7 +2,7 @@
 //
 // Who ends a job that several clients have asked for.
 #include "absl/strings/str_cat.h"
-#include "server/decomposition/wanted_job.h"
+#include "server/decomposition/job/wanted_job.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "server/base/sha256.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/worker_command.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/worker/worker_command.h"
 #include "tests/server/decomposition/scripted_worker.h"
 
 namespace carillon {

@@ -11,8 +11,8 @@
 
 #include "server/base/sha256.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/local_executor.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "tests/server/decomposition/scripted_worker.h"
 
 namespace carillon {

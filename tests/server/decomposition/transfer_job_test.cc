@@ -12,9 +12,9 @@
 
 #include "proto/cpp/material_catalogue.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/decomposition_request.h"
-#include "server/decomposition/local_executor.h"
-#include "server/decomposition/wanted_job.h"
+#include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/job/wanted_job.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "tests/server/decomposition/scripted_worker.h"
 #include "tests/server/mode_database/sample_transfer.h"
 

@@ -214,7 +214,8 @@ TEST_F(ReadGltfTest, IndicesOutOfRangeAreRefused) {
   corner.primitive()["indices"] = corner.Add<uint8_t>("SCALAR", kUint8, {0, 2, 4});
   EXPECT_THAT(
       Refused(corner.Text(), "gltf"),
-      HasSubstr("MESH_UNREADABLE: the file cannot be read as glTF: a triangle names vertex 4 of 4"));
+      HasSubstr(
+          "MESH_UNREADABLE: the file cannot be read as glTF: a triangle names vertex 4 of 4"));
   Document node;
   node.root()["scenes"][0]["nodes"] = {3};
   EXPECT_THAT(Refused(node.Text(), "gltf"), HasSubstr("names element \"3\" of its 1 nodes"));

@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "precompute/mesh/read/elements/inp_file.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "precompute/mesh/read/elements/inp_kind.h"
+#include "precompute/mesh/read/elements/inp_lines.h"
+#include "precompute/mesh/read/elements/inp_model.h"
+#include "precompute/mesh/read/elements/inp_motion.h"
+#include "precompute/mesh/read/text/text_lines.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::precompute {
+namespace {
+
+/// Keywords that make, move, add or take away parts of the body in ways that are not read.
+constexpr std::string_view kInpRefused[] = {"INCLUDE",
+                                            "NGEN",
+                                            "NFILL",
+                                            "NCOPY",
+                                            "NMAP",
+                                            "ELGEN",
+                                            "ELCOPY",
+                                            "IMPERFECTION",
+                                            "IMPORT",
+                                            "SYMMETRIC MODEL GENERATION",
+                                            "CYCLIC SYMMETRY MODEL",
+                                            "NONSTRUCTURAL MASS",
+                                            "MASS",
+                                            "ROTARY INERTIA",
+                                            "MODEL CHANGE",
+                                            "PARAMETER"};
+/// Conditions that change how the body vibrates, and that the settings of a model give instead.
+constexpr std::string_view kInpConditions[] = {"BOUNDARY", "EQUATION",   "MPC",
+                                               "COUPLING", "RIGID BODY", "TIE"};
+
+class InpParser {
+ public:
+  explicit InpParser(const std::string& bytes) : lines_(bytes) {}
+
+  absl::StatusOr<ElementFile> Parse() && {
+    std::string_view line;
+    while (lines_.Next(line)) {
+      const size_t begin = line.find_first_not_of(" \t");
+      if (begin == std::string_view::npos || line.substr(begin).starts_with("**")) continue;
+      RETURN_IF_ERROR(line[begin] == '*' ? Begin(line.substr(begin)) : Take(line.substr(begin)));
+    }
+    RETURN_IF_ERROR(EndBlock());
+    ASSIGN_OR_RETURN(ElementFile file, JoinBodies(TakeBodies(), assembly_sets_));
+    file.warnings = std::move(warnings_);
+    return file;
+  }
+
+ private:
+  /// Begins the block of a keyword line, which goes on in the next line after a comma at its end.
+  absl::Status Begin(std::string_view line) {
+    RETURN_IF_ERROR(EndBlock());
+    std::string joined(line);
+    std::string_view more;
+    const auto trim = [&] { joined.erase(joined.find_last_not_of(" \t\r") + 1); };
+    for (trim(); joined.ends_with(',') && lines_.Next(more); trim()) joined += more;
+    keyword_ = ParseInpKeyword(joined);
+    data_lines_ = 0;
+    if (std::ranges::find(kInpRefused, keyword_.name) != std::end(kInpRefused)) {
+      return NotRead(absl::StrCat("*", keyword_.name));
+    }
+    for (const char* parameter : {"INPUT", "FILE"}) {
+      const bool is_mesh = keyword_.name == "NODE" || keyword_.name == "ELEMENT" ||
+                           keyword_.name == "NSET" || keyword_.name == "ELSET";
+      if (is_mesh && keyword_.Has(parameter)) return NotRead(absl::StrCat(parameter, "="));
+    }
+    WarnOfCondition();
+    if (keyword_.name == "PART" || keyword_.name == "INSTANCE" || keyword_.name == "ASSEMBLY" ||
+        keyword_.name.starts_with("END ")) {
+      return ChangeScope();
+    }
+    if (keyword_.name == "SYSTEM") system_ = {};
+    if (keyword_.name == "NODE") return BeginNodes();
+    if (keyword_.name == "ELEMENT") return BeginElements();
+    if (keyword_.name == "SOLID SECTION") return TakeSection();
+    return absl::OkStatus();
+  }
+
+  absl::Status NotRead(absl::string_view what) const {
+    return lines_.Unreadable(
+        absl::StrCat("it has ", what,
+                     ", which is not read; only files with all nodes and elements of the body "
+                     "written out are"));
+  }
+
+  void WarnOfCondition() {
+    if (std::ranges::find(kInpConditions, keyword_.name) == std::end(kInpConditions)) return;
+    const std::string warning = absl::StrCat("*", keyword_.name, " of the file (line ",
+                                             lines_.number(), ") is not used; --fix fixes a body");
+    if (warned_.insert(keyword_.name).second) warnings_.push_back(warning);
+  }
+
+  /// *PART, *ASSEMBLY and *INSTANCE, and their ends.
+  absl::Status ChangeScope() {
+    system_ = {};
+    if (keyword_.name == "PART") {
+      scope_ = &parts_[InpName(keyword_.Of("NAME"))];
+    } else if (keyword_.name == "INSTANCE") {
+      if (keyword_.Has("LIBRARY") || keyword_.Has("INSTANCE")) {
+        return NotRead("an *INSTANCE of another analysis");
+      }
+      const auto part = parts_.find(InpName(keyword_.Of("PART")));
+      if (part == parts_.end()) {
+        return lines_.Unreadable(absl::StrCat(
+            "an instance of the part ", QuotedText(keyword_.Of("PART")), ", which is not there"));
+      }
+      instances_.push_back(std::make_unique<InpBody>(InpBody{keyword_.Of("NAME"), part->second}));
+      scope_ = &instances_.back()->scope;
+    } else if (keyword_.name == "ASSEMBLY" || keyword_.name == "END INSTANCE") {
+      scope_ = &assembly_;
+    } else if (keyword_.name == "END PART" || keyword_.name == "END ASSEMBLY") {
+      scope_ = &model_;
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status BeginNodes() {
+    const std::string system = InpName(keyword_.Of("SYSTEM"));
+    is_cylindrical_ = system.starts_with('C');
+    if (system.empty() || system.starts_with('R') || is_cylindrical_) return absl::OkStatus();
+    return NotRead(absl::StrCat("*NODE, SYSTEM=", EscapedText(system.substr(0, 60))));
+  }
+
+  absl::Status BeginElements() {
+    const std::string type = InpName(keyword_.Of("TYPE"));
+    kind_ = FindInpKind(type);
+    if (kind_) return absl::OkStatus();
+    return UnsupportedElements(absl::StrCat("elements of type ", EscapedText(type.substr(0, 60)),
+                                            " (line ", lines_.number(), ")"));
+  }
+
+  absl::Status TakeSection() {
+    if (keyword_.Has("COMPOSITE")) return NotRead("*SOLID SECTION, COMPOSITE");
+    scope_->materials.insert(InpName(keyword_.Of("MATERIAL")));
+    return absl::OkStatus();
+  }
+
+  /// Takes a line of data of the current block.
+  absl::Status Take(std::string_view line) {
+    ++data_lines_;
+    const std::vector<std::string_view> fields = InpFields(line);
+    if (keyword_.name == "NODE") return TakeNode(fields);
+    if (keyword_.name == "ELEMENT" && kind_) return TakeElement(fields);
+    if (keyword_.name == "NSET") return TakeSet(fields, keyword_.Of("NSET"), true);
+    if (keyword_.name == "ELSET") return TakeSet(fields, keyword_.Of("ELSET"), false);
+    if (keyword_.name == "INSTANCE") return TakePlace(fields);
+    if (keyword_.name == "SYSTEM") return TakeSystem(fields);
+    return absl::OkStatus();
+  }
+
+  absl::Status EndBlock() const {
+    if (pending_.empty()) return absl::OkStatus();
+    return lines_.Unreadable(absl::StrCat("element ", pending_[0], " has too few nodes"));
+  }
+
+  absl::StatusOr<std::vector<double>> Reals(const std::vector<std::string_view>& fields,
+                                            size_t first) const {
+    std::vector<double> values;
+    for (size_t i = first; i < fields.size(); ++i) {
+      const std::optional<double> value = InpReal(fields[i]);
+      if (!value) return lines_.Unreadable(absl::StrCat(QuotedText(fields[i]), " is no number"));
+      values.push_back(*value);
+    }
+    return values;
+  }
+
+  /// The lines of an instance: a translation, then the axis (two points) and angle of a rotation.
+  absl::Status TakePlace(const std::vector<std::string_view>& fields) {
+    ASSIGN_OR_RETURN(std::vector<double> v, Reals(fields, 0));
+    InpMotion& motion = instances_.back()->motion;
+    if (data_lines_ == 1 && v.size() <= 3) {
+      v.resize(3);
+      motion.shift = {v[0], v[1], v[2]};
+      return absl::OkStatus();
+    }
+    const Point a = {v[0], v.size() > 1 ? v[1] : 0, v.size() > 2 ? v[2] : 0};
+    v.resize(7);
+    const Point b = {v[3], v[4], v[5]};
+    if (data_lines_ > 2 || fields.size() > 7 || a == b) {
+      return lines_.Unreadable(
+          "no place of an instance (\"x, y, z\", then two points of an axis and an angle)");
+    }
+    motion.Turn(a, b, v[6]);
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeSystem(const std::vector<std::string_view>& fields) {
+    ASSIGN_OR_RETURN(const std::vector<double> values, Reals(fields, 0));
+    if (system_.TakeLine(values, data_lines_)) return absl::OkStatus();
+    return lines_.Unreadable("no points of *SYSTEM, or they lie on one line");
+  }
+
+  absl::Status TakeNode(const std::vector<std::string_view>& fields) {
+    const auto number = fields.empty() ? std::nullopt : ToNumber<int64_t>(fields[0]);
+    const absl::StatusOr<std::vector<double>> values = Reals(fields, 1);
+    if (!number || fields.size() > 7 || !values.ok()) {  // normals may follow
+      return lines_.Unreadable("no node (\"number, x, y, z\")");
+    }
+    Point p{};
+    for (size_t x = 0; x < std::min<size_t>(3, values->size()); ++x) p[x] = (*values)[x];
+    p = system_.Apply(is_cylindrical_ ? FromCylindrical(p) : p);
+    if (!keyword_.Of("NSET").empty())
+      scope_->SetNamed(keyword_.Of("NSET")).nodes.push_back(*number);
+    const auto [found, is_new] = scope_->node_at.try_emplace(*number, scope_->points.size());
+    if (!is_new && scope_->points[found->second] != p) {
+      return lines_.Unreadable(
+          absl::StrCat("node ", *number, " is there twice, at different places"));
+    }
+    if (!is_new) return absl::OkStatus();
+    scope_->node_numbers.push_back(*number);
+    scope_->points.push_back(p);
+    return CheckNodeCountOfFile(scope_->points.size());
+  }
+
+  /// The numbers of an element may go over several lines.
+  absl::Status TakeElement(const std::vector<std::string_view>& fields) {
+    for (const std::string_view field : fields) {
+      const auto number = ToNumber<int64_t>(field);
+      if (!number) return lines_.Unreadable("no element (\"number, nodes\")");
+      pending_.push_back(*number);
+    }
+    if (pending_.size() < 1 + kind_->node_count) return absl::OkStatus();
+    if (pending_.size() > 1 + kind_->node_count) {
+      return lines_.Unreadable(absl::StrCat("element ", pending_[0], " has too many nodes"));
+    }
+    const std::vector<int64_t> element = std::exchange(pending_, {});
+    const int64_t number = element[0];
+    if (!keyword_.Of("ELSET").empty()) {
+      scope_->SetNamed(keyword_.Of("ELSET")).elements.push_back(number);
+    }
+    if (!scope_->element_at.try_emplace(number, scope_->elements.size()).second) {
+      return lines_.Unreadable(absl::StrCat("element ", number, " is there twice"));
+    }
+    scope_->elements.push_back({number, *kind_, scope_->element_nodes.size()});
+    scope_->element_nodes.insert(scope_->element_nodes.end(), element.begin() + 1, element.end());
+    return absl::OkStatus();
+  }
+
+  /// Takes members of a set: numbers, names of other sets, or with GENERATE "first, last, step".
+  absl::Status TakeSet(const std::vector<std::string_view>& fields, const std::string& name,
+                       bool of_nodes) {
+    if (keyword_.Has("GENERATE")) return Generate(fields, name, of_nodes);
+    for (const std::string_view field : fields) {
+      const auto number = ToNumber<int64_t>(field);
+      if (number) {
+        AddMember(name, *number, of_nodes);
+      } else {
+        AddSet(name, std::string(field), of_nodes);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Generate(const std::vector<std::string_view>& fields, const std::string& name,
+                        bool of_nodes) {
+    std::array<int64_t, 3> range = {0, 0, 1};
+    for (size_t i = 0; i < std::min(fields.size(), range.size()); ++i) {
+      range[i] = ToNumber<int64_t>(fields[i]).value_or(-1);
+    }
+    const auto& [first, last, step] = range;
+    if (fields.size() < 2 || first < 0 || step < 1 || (last - first) / step > kMostMembers) {
+      return lines_.Unreadable("no range of a set (\"first, last, step\")");
+    }
+    for (int64_t number = first; number <= last; number += step) AddMember(name, number, of_nodes);
+    return absl::OkStatus();
+  }
+
+  void AddMember(const std::string& name, int64_t number, bool of_nodes) {
+    if (keyword_.Has("INSTANCE"))
+      return AddMemberOf(keyword_.Of("INSTANCE"), name, number, of_nodes);
+    InpScope::Set& set = scope_->SetNamed(name);
+    (of_nodes ? set.nodes : set.elements).push_back(number);
+  }
+
+  void AddMemberOf(const std::string& instance, const std::string& name, int64_t number,
+                   bool of_nodes) {
+    const auto is_same = [&](const InpAssemblySet& set) {
+      return absl::EqualsIgnoreCase(set.name, name) &&
+             absl::EqualsIgnoreCase(set.instance, instance);
+    };
+    auto set = std::ranges::find_if(assembly_sets_, is_same);
+    if (set == assembly_sets_.end()) {
+      set = assembly_sets_.insert(set, InpAssemblySet{name, instance, {}, {}});
+    }
+    (of_nodes ? set->nodes : set->elements).push_back(number);
+  }
+
+  /// Adds the members of another set, or in an assembly "INSTANCE.NUMBER" or "INSTANCE.SET".
+  void AddSet(const std::string& name, const std::string& other, bool of_nodes) {
+    InpScope* scope = scope_;
+    std::string instance = keyword_.Of("INSTANCE"), rest = other;
+    if (const size_t dot = other.rfind('.'); dot != std::string::npos && instance.empty()) {
+      instance = other.substr(0, dot);
+      rest = other.substr(dot + 1);
+    }
+    if (!instance.empty()) {
+      const auto body = std::ranges::find_if(
+          instances_, [&](const auto& b) { return absl::EqualsIgnoreCase(b->name, instance); });
+      scope = body == instances_.end() ? nullptr : &(*body)->scope;
+      const auto number = ToNumber<int64_t>(rest);
+      if (scope != nullptr && number) return AddMemberOf(instance, name, *number, of_nodes);
+    }
+    const InpScope::Set* found = scope == nullptr ? nullptr : scope->FindSet(rest);
+    if (found == nullptr) {
+      warnings_.push_back(absl::StrCat("line ", lines_.number(), ": the set ", QuotedText(other),
+                                       " is not there, and was left out of ", QuotedText(name)));
+      return;
+    }
+    const InpScope::Set members = *found;
+    if (instance.empty() && absl::EqualsIgnoreCase(name, other)) return;
+    for (const int64_t n : of_nodes ? members.nodes : members.elements) {
+      if (instance.empty()) {
+        AddMember(name, n, of_nodes);
+      } else {
+        AddMemberOf(instance, name, n, of_nodes);
+      }
+    }
+  }
+
+  /// The instances; where there are none, the only part, or what stands outside all parts.
+  std::vector<InpBody> TakeBodies() {
+    std::vector<InpBody> bodies;
+    for (const auto& instance : instances_) bodies.push_back(std::move(*instance));
+    if (bodies.empty()) {
+      for (auto& [name, part] : parts_) bodies.push_back({name, std::move(part)});
+    }
+    if (bodies.empty() || !model_.elements.empty()) bodies.push_back({"", std::move(model_)});
+    return bodies;
+  }
+
+  static constexpr int64_t kMostMembers = 10'000'000;
+
+  TextLines lines_;
+  InpScope model_, assembly_;
+  std::map<std::string, InpScope> parts_;
+  std::vector<std::unique_ptr<InpBody>> instances_;
+  std::vector<InpAssemblySet> assembly_sets_;
+  InpScope* scope_ = &model_;  // to which the lines belong that are being read
+  InpKeyword keyword_;
+  int data_lines_ = 0;            // of the current block so far
+  std::optional<InpKind> kind_;   // the kind of the elements that are being read
+  std::vector<int64_t> pending_;  // the number and the first nodes of an element
+  bool is_cylindrical_ = false;   // how the nodes are given that are being read
+  InpSystem system_;              // and in which system
+  std::set<std::string> warned_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+absl::StatusOr<ElementFile> ParseInp(const std::string& bytes) { return InpParser(bytes).Parse(); }
+
+}  // namespace carillon::precompute
