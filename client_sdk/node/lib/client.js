@@ -29,6 +29,9 @@ function jobFilter(filters) {
   return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
 }
 
+/** The methods of this package for those of the contract that have streams. */
+const STREAMS = { Listen: 'listen, and for await (const block of recording)', Render: 'render',
+  StreamContacts: 'Scene.stream', UploadMesh: 'upload', WatchJob: 'watch', WatchJobs: 'watchJobs' };
 const MODELS = 'modalModels/';
 const PIECE_BYTES = 1 << 20;
 
@@ -74,8 +77,14 @@ class Client {
     return this.stubs.get(service);
   }
 
-  /** Calls a method that takes one message and answers one. */
+  /** Calls a method that takes one message and answers one. Throws a TypeError for a method that has streams. */
   call(service, method, request) {
+    const path = services[service]?.service[method];
+    if (!path) refuse(`${service}.${method}`, 'the call', 'a method of the contract, such as "SceneService", "ListScenes"');
+    if (path.requestStream || path.responseStream) {
+      throw new TypeError(`${service}.${method} has a stream of messages, which call cannot carry; use ` +
+        (STREAMS[method] ?? `stub('${service}').${method}`));
+    }
     return new Promise((resolve, reject) => {
       this.stub(service)[method](request, (error, answer) => {
         if (error) reject(fromCall(error, this.server));
@@ -322,9 +331,10 @@ class Client {
    */
   async listen(request = {}) {
     refuseNoMessage(request, 'ListenRequest', 'listen');
-    const answers = this.answers(this.stub('AudioService').Listen(request));
+    const stream = this.stub('AudioService').Listen(request);
+    const answers = this.answers(stream);
     const { value } = await answers.next();
-    return new Recording(answers, value.format);
+    return new Recording(stream, answers, value.format);
   }
 
   [util.inspect.custom]() {
@@ -339,34 +349,72 @@ class Client {
   }
 }
 
-/** What the daemon plays, from the call of Client.listen on. */
+/**
+ * What the daemon plays, from the call of Client.listen on: in pieces of any length by `take`, or, with `for await`, in
+ * blocks as they come. Leaving the loop, or `stop`, ends the recording.
+ */
 class Recording {
-  constructor(answers, format) {
+  constructor(stream, answers, format) {
+    this.stream = stream;
     this.answers = answers;
     this.format = format;
+    this.pieces = []; // what was heard and not taken, as bytes
+    this.byteCount = 0;
+    this.lostFrameCount = 0;
   }
 
-  /** Waits until this much of the sound since the beginning was heard, ends the recording, and returns the sound. */
+  /** Waits for the next answer. Returns false after the last one. */
+  async hear() {
+    const { value, done } = await this.answers.next();
+    if (done) return false;
+    this.pieces.push(value.block.samples);
+    this.byteCount += value.block.samples.length;
+    this.lostFrameCount = value.lost_frame_count;
+    return true;
+  }
+
+  /** The first bytes of what was heard, as a Sound. */
+  cut(byteCount) {
+    const heard = Buffer.concat(this.pieces);
+    this.pieces = [heard.subarray(byteCount)];
+    this.byteCount = this.pieces[0].length;
+    const samples = this.isShort ? samplesOfIntegers : samplesOf;
+    const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
+    return new Sound(samples([heard.subarray(0, byteCount)]), rateHz, channelCount);
+  }
+
+  get isShort() {
+    return this.format.encoding === 'AUDIO_ENCODING_INT16';
+  }
+
+  /**
+   * Waits for the next seconds of the sound, and returns them: the first call from the beginning of the recording on, and
+   * each further call from where the one before ended, without a gap. A sound that ends before, since its scene was
+   * deleted, is shorter.
+   */
   async take(seconds) {
     if (!(seconds > 0 && seconds < Infinity)) refuse(seconds, 'seconds', 'a number above 0');
-    if (this.isTaken) {
-      throw new Error('this recording has been taken; begin another one by listen');
-    }
-    this.isTaken = true;
     const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
-    const wanted = Math.floor(seconds * rateHz) * channelCount;
-    const isShort = this.format.encoding === 'AUDIO_ENCODING_INT16';
-    const pieces = [];
-    let count = 0;
-    while (count < wanted) {
-      const { value, done } = await this.answers.next();
-      if (done) break;
-      pieces.push(value.block.samples);
-      count += value.block.samples.length / (isShort ? 2 : 4);
+    const wanted = Math.floor(seconds * rateHz) * channelCount * (this.isShort ? 2 : 4);
+    while (this.byteCount < wanted && await this.hear());
+    return this.cut(wanted);
+  }
+
+  /** Yields the sound in blocks as they come, until the loop is left or the scene is deleted. */
+  async* [Symbol.asyncIterator]() {
+    try {
+      do {
+        if (this.byteCount) yield this.cut(this.byteCount);
+      } while (await this.hear());
+    } finally {
+      await this.stop();
     }
+  }
+
+  /** Ends the recording. A take that waits throws CarillonError (CANCELLED). */
+  async stop() {
+    this.stream.cancel();
     await this.answers.return();
-    const samples = isShort ? samplesOfIntegers(pieces) : samplesOf(pieces);
-    return new Sound(samples.subarray(0, wanted), rateHz, channelCount);
   }
 }
 

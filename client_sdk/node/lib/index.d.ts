@@ -291,10 +291,22 @@ export class ContactStream {
   close(warn?: boolean): Promise<StreamContactsResponse__Output>;
 }
 
-/** What the daemon plays, from the call of Client.listen on. */
+/**
+ * What the daemon plays, from the call of Client.listen on, by `take` or `for await`. It lasts until `stop`, the end of
+ * such a loop, or `close` of the client.
+ */
 export class Recording {
-  /** Waits until this many seconds, above 0, were heard, ends the recording, and returns the sound. Called once. */
+  /**
+   * Waits for the next seconds of the sound, and returns them: the first call from the beginning of the recording on, and
+   * each further call from where the one before ended, without a gap.
+   */
   take(seconds: number): Promise<Sound>;
+  /** Yields the sound in blocks as they come, until the loop is left or the scene is deleted. */
+  [Symbol.asyncIterator](): AsyncGenerator<Sound>;
+  /** Frames that were lost so far, because the program did not read fast enough. */
+  readonly lostFrameCount: number;
+  /** Ends the recording. */
+  stop(): Promise<void>;
 }
 
 export interface JobFilters {
@@ -346,7 +358,10 @@ export class Client {
   setVolume(volume: { gain?: number; muted?: boolean }): Promise<UpdateMixerResponse__Output>;
   /** Fades out all that sounds in your scenes. Returns their number. */
   stopAll(): Promise<number>;
-  /** Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". */
+  /**
+   * Calls a method of the contract that takes one message and answers one, such as "SceneService", "ListScenes". Throws a
+   * TypeError for a method that has streams, such as Listen.
+   */
   call(service: string, method: string, request: object): Promise<any>;
   /** Cancels streams that were not closed, recordings and renderings, and ends the connection after the other calls. */
   close(): void;

@@ -367,13 +367,36 @@ test('a stream that is being closed ends though its client is closed', async () 
   await scene.delete();
 });
 
-test('a recording is taken once, for a time above zero', async () => {
-  const record = await c.listen();
+test('takes follow each other without a gap, and then blocks', async () => withScene(async (scene) => {
+  const bar = await scene.add(model);
+  const [whole, pieces] = [await scene.listen(), await scene.listen()];
   for (const seconds of [NaN, undefined, 0, -1]) {
-    await assert.rejects(record.take(seconds), /seconds is \S+; it must be a number above 0/);
+    await assert.rejects(pieces.take(seconds), /seconds is \S+; it must be a number above 0/);
   }
-  assert.ok((await record.take(0.1)).samples.length > 0);
-  await assert.rejects(record.take(0.1), /has been taken; begin another one by listen/);
+  await bar.strike(STRIKE);
+  const joined = [...(await pieces.take(0.3)).samples, ...(await pieces.take(0.001)).samples];
+  for await (const block of pieces) {
+    joined.push(...block.samples);
+    if (joined.length > 24000) break;
+  }
+  const atOnce = (await whole.take(1)).samples;
+  await whole.stop();
+  // The two recordings may begin at different blocks.
+  const [first, other] = [joined, atOnce].map((samples) => samples.findIndex((x) => Math.abs(x) > 1e-3));
+  assert.ok(first >= 0 && other >= 0);
+  assert.deepEqual(joined.slice(first), [...atOnce.slice(other, other + joined.length - first)]);
+}));
+
+test('a take that waits ends with its recording', async () => {
+  const record = await c.listen();
+  const waiting = assert.rejects(record.take(3600), { reason: 'CANCELLED' });
+  await record.stop();
+  await waiting;
+});
+
+test('a method with streams is not called as one without', () => {
+  assert.throws(() => c.call('AudioService', 'Listen', {}), /AudioService.Listen has a stream .* use listen/);
+  assert.throws(() => c.call('AudioService', 'Lisen', {}), /'AudioService.Lisen'; it must be a method/);
 });
 
 test('a stream that is too fast drops the oldest steps', async () => withScene(async (scene) => {

@@ -19,13 +19,14 @@ from carillon.v1 import audio_service_pb2, contact_service_pb2
 
 
 class _Recording(Block):
-    """What the daemon plays within the block, from its first line on. `sound` is what was heard so far."""
+    """What the daemon plays within the block, from its first line on, which `take` returns piece by piece. `sound` is
+    what was heard and not taken yet."""
 
     def __init__(self, client: Connection, request: dict[str, Any]):
         self._client = client
         self._request = checks.message(audio_service_pb2.ListenRequest, "recording", request)
-        self._blocks: list[bytes] = []
-        self._frame_count = self._lost = 0
+        self._heard = bytearray()
+        self._lost = self._told_lost = 0
         self._error: Optional[errors.CarillonError] = None
         self._call: Any = None
 
@@ -35,35 +36,46 @@ class _Recording(Block):
         answers = self._client.messages(self._call)
         self._format = (await answers.__anext__()).format
         self._short = self._format.encoding == audio_service_pb2.AUDIO_ENCODING_INT16
+        self._frame_bytes = (2 if self._short else 4) * self._format.channel_count
         return answers
 
     def _take_in(self, answer: audio_service_pb2.ListenResponse) -> None:
-        self._blocks.append(answer.block.samples)
-        self._frame_count += len(answer.block.samples) // ((2 if self._short else 4) * self._format.channel_count)
+        self._heard += answer.block.samples
         self._lost = answer.lost_frame_count
 
     @property
     def sound(self) -> Sound:
-        samples = numpy.frombuffer(b"".join(list(self._blocks)), "<i2" if self._short else "<f4")
+        return self._sound_of(bytes(self._heard))
+
+    def _sound_of(self, heard: bytes) -> Sound:
+        samples = numpy.frombuffer(heard, "<i2" if self._short else "<f4")
         if self._short:
             samples = samples.astype("<f4") / 32767
-        return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz, self._lost)
+        return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz,
+                     self._lost - self._told_lost)
+
+    def _has(self, frame_count: int) -> bool:
+        """Whether a take of so many frames need not wait."""
+        return len(self._heard) >= frame_count * self._frame_bytes or self._error is not None
 
     def _frames_of(self, seconds: float) -> int:
         if not seconds > 0:
             checks.refuse(seconds, "seconds", "more than 0")
         return int(seconds * self._format.sample_rate_hz)
 
-    def _first(self, frame_count: int) -> Sound:
-        if self._error:
+    def _take(self, frame_count: int) -> Sound:
+        end = frame_count * self._frame_bytes
+        if len(self._heard) < end and self._error:
             raise self._error
-        heard = self.sound
-        return Sound(heard.samples[:frame_count], heard.sample_rate_hz, heard.lost_frame_count)
+        taken = self._sound_of(bytes(self._heard[:end]))
+        del self._heard[:end]
+        self._told_lost = self._lost
+        return taken
 
 
 class Recording(BlockingBlock, _Recording):
     """What the daemon plays within the block, from its first line on; a thread collects it. `sound` is what was heard
-    so far."""
+    and not taken yet."""
 
     async def _enter(self) -> None:
         answers = await self._open()
@@ -83,12 +95,13 @@ class Recording(BlockingBlock, _Recording):
                 self._more.notify_all()
 
     def take(self, seconds: float) -> Sound:
-        """Waits until this much of the sound since the beginning was heard, and returns it. Raises CarillonError if the
-        recording ends before."""
+        """Waits for the next seconds of the sound, and returns them. The first call begins where the recording begins,
+        and each further call where the one before ended, without a gap. `lost_frame_count` of the sound counts the
+        frames that were lost since that call. Raises CarillonError if the recording ends before."""
         wanted = self._frames_of(seconds)
         with self._more:
-            self._more.wait_for(lambda: self._frame_count >= wanted or self._error)
-            return self._first(wanted)
+            self._more.wait_for(lambda: self._has(wanted))
+            return self._take(wanted)
 
     def stop(self) -> None:
         """Ends the recording."""
@@ -100,8 +113,8 @@ class Recording(BlockingBlock, _Recording):
 
 
 class AsyncRecording(AwaitedBlock, _Recording):
-    """What the daemon plays within the block, from its first line on; a task collects it. `sound` is what was heard so
-    far."""
+    """What the daemon plays within the block, from its first line on; a task collects it. `sound` is what was heard and
+    not taken yet."""
 
     async def _enter(self) -> None:
         answers = await self._open()
@@ -120,11 +133,11 @@ class AsyncRecording(AwaitedBlock, _Recording):
                 self._more.notify_all()
 
     async def take(self, seconds: float) -> Sound:
-        """Waits until this much of the sound since the beginning was heard, and returns it; see Recording.take."""
+        """Waits for the next seconds of the sound, and returns them; see Recording.take."""
         wanted = self._frames_of(seconds)
         async with self._more:
-            await self._more.wait_for(lambda: self._frame_count >= wanted or self._error)
-        return self._first(wanted)
+            await self._more.wait_for(lambda: self._has(wanted))
+            return self._take(wanted)
 
     async def stop(self) -> None:
         """Ends the recording."""
