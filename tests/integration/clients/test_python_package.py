@@ -102,6 +102,21 @@ class ModelsTest(PackageTest):
         with self.assertRaises(carillon.ServerUnavailable):
             carillon.connect(f"unix:{self.folder}/nobody").status()
 
+    def test_pictures_have_titles_units_and_frequencies(self):
+        import matplotlib
+        matplotlib.use("Agg")
+        heard = self.model.render_strike(POINT, IMPULSE, seconds=0.5)
+        frequencies = self.model.frequencies()
+        for axes, unit in ((heard.plot(), "s"), (heard.plot_spectrum(), "Hz"), (self.model.plot_modes(), "Hz"),
+                           (self.model.plot_shape(1), "m")):
+            self.assertTrue(axes.get_title())
+            self.assertTrue(axes.get_xlabel().endswith(f"/ {unit}"), axes.get_xlabel())
+        shown = [float(text.get_text().split()[0]) for text in self.model.plot_modes().texts]
+        self.assertTrue(all(numpy.abs(frequencies - hz).min() <= 0.051 for hz in shown))
+        self.assertIn(f"{frequencies[1]:.1f} Hz", self.model.plot_shape(1).get_title())
+        peaks = [float(text.get_text().split()[0]) for text in heard.plot_spectrum().texts]
+        self.assertLess(abs(peaks[0] - heard.loudest_frequency_hz()), 0.1)
+
     def test_a_notebook_shows_models_and_plays_sounds(self):
         self.assertIn(f"<td>{self.model.name}</td>", self.model._repr_html_())
         heard = self.model.render_strike(POINT, IMPULSE, seconds=0.1)
@@ -123,6 +138,20 @@ class SoundTest(PackageTest):
                 heard = record.take(1.5)
         self.assertEqual(heard.samples.shape, (72000, 1))
         self.assert_rings(heard)
+
+    def test_takes_follow_each_other_without_a_gap(self):
+        with self.c.scene() as scene:
+            bar = scene.add(self.model)
+            with self.c.recording(scene=scene.name) as whole, self.c.recording(scene=scene.name) as pieces:
+                bar.strike(POINT, IMPULSE, DURATION_S)
+                taken = [pieces.take(seconds) for seconds in (0.3, 0.001, 0.2)]
+                at_once = whole.take(1.0)
+        joined = numpy.concatenate([piece.samples[:, 0] for piece in taken])
+        self.assertEqual(len(joined), 24048)
+        # The two recordings may begin at different blocks.
+        first, other = (int(numpy.flatnonzero(numpy.abs(samples) > 1e-3)[0])
+                        for samples in (joined, at_once.samples[:, 0]))
+        numpy.testing.assert_array_equal(joined[first:], at_once.samples[other:other + len(joined) - first, 0])
 
     def test_a_saved_sound_reads_back(self):
         heard = self.model.render_strike(POINT, IMPULSE, seconds=0.2)

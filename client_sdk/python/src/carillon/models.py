@@ -183,14 +183,22 @@ class Model(Blocking, ModelCalls):
         return finished(self._arrays())
 
     def plot_modes(self, material: Optional[materials.Material] = None, axes: Any = None) -> Any:
-        """Draws the frequencies of the modes and their couplings to the air; needs matplotlib. Returns its axes."""
+        """Draws the modes at their frequencies, each as high as the sound power that it radiates at the same speed of
+        vibration. Without a transfer for the material that is the power of the paper's coupling, as the title says.
+        Needs matplotlib. Returns its axes."""
         from carillon import plots
-        return plots.plot_modes(self.frequencies(material), self.arrays["couplings"], axes)
+        power = self.radiation_decays(material)
+        radiates = power.any()
+        if not radiates:
+            power = self.arrays["couplings"] ** 2
+        return plots.plot_modes(self.frequencies(material), power, f"{self.label or self.name}: modes by " + (
+            "radiated power" if radiates else "the paper's coupling, for lack of a transfer"), axes)
 
     def plot_shape(self, mode: int, axes: Any = None) -> Any:
         """Draws the shape of one mode, counted from zero; needs matplotlib. Returns its axes."""
         from carillon import plots
-        return plots.plot_shape(self.arrays, mode, axes)
+        frequency = f": {self.frequencies()[mode]:.1f} Hz" if self.material is not None else ""
+        return plots.plot_shape(self.arrays, mode, f"{self.label or self.name}, mode {mode}{frequency}", axes)
 
     def _rows(self) -> dict[str, str]:
         rows = super()._rows()
