@@ -100,10 +100,7 @@ void AddTransfer(CLI::App& app, Program& program) {
   auto options = std::make_shared<CreateTransferOptions>();
   CLI::App& create = *app.add_subcommand(
       "transfer", "Compute the radiation of a stored model for a material, and store it");
-  create
-      .add_option("model", options->model,
-                  "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  create.add_option("model", options->model, kModelName)->required();
   TakeSize(*create.add_option("--size", options->size, "The size relative to that of the model"));
   TakeWithin(*create.add_option("--accuracy", options->accuracy_db,
                                 "The error of each mode's power that is small enough, dB [2]"),
@@ -148,10 +145,7 @@ void CheckImpulse(const std::array<double, 3>& impulse) {
 void AddStrike(CLI::App& app, Program& program) {
   auto options = std::make_shared<StrikeOptions>();
   CLI::App& strike = *app.add_subcommand("strike", "Strike a model once and let it ring");
-  strike
-      .add_option("model", options->model,
-                  "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  strike.add_option("model", options->model, kModelName)->required();
   strike
       .add_option("--point", options->point_m,
                   "The struck point: X,Y,Z or X Y Z in the frame of the object, m")

@@ -94,9 +94,7 @@ void AddModelShow(CLI::App& app, Program& program) {
   auto material = std::make_shared<MaterialFigures>();
   CLI::App& show = *app.add_subcommand(
       "show", "Show a model and, with a material, its frequencies and decay rates");
-  show.add_option("model", *model,
-                  "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  show.add_option("model", *model, kModelName)->required();
   AddMaterial(show, *material);
   show.callback([&program, model, material] {
     program.command = [&program, model, material] {
@@ -108,10 +106,7 @@ void AddModelShow(CLI::App& app, Program& program) {
 void AddModelDelete(CLI::App& app, Program& program) {
   auto models = std::make_shared<std::vector<std::string>>();
   CLI::App& command = *app.add_subcommand("delete", "Delete models");
-  command
-      .add_option("model", *models,
-                  "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  command.add_option("model", *models, kModelName)->required();
   command.callback([&program, models] {
     program.command = [&program, models] {
       return DeleteModels(*program.Daemon(), *models, program.json);
@@ -174,9 +169,7 @@ void AddModelTag(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
   auto change = std::make_shared<v1::UpdateModalModelRequest>();
   CLI::App& tag = *app.add_subcommand("tag", "Label, tag or pin a model, or set its material");
-  tag.add_option("model", *model,
-                 "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  tag.add_option("model", *model, kModelName)->required();
   tag.add_option_function<std::string>(
       "--label", [change](const std::string& text) { change->set_label(text); }, "The new label");
   tag.add_option_function<std::vector<std::string>>(
@@ -215,10 +208,7 @@ void AddModelExport(CLI::App& app, Program& program) {
   auto options = std::make_shared<ExportOptions>();
   CLI::App& command = *app.add_subcommand(
       "export", "Write a model to a file in its stored form, as glTF, or for NumPy");
-  command
-      .add_option("model", options->model,
-                  "The name, the label, or the first digits of the digest of a model")
-      ->required();
+  command.add_option("model", options->model, kModelName)->required();
   command.add_option("--out", options->file,
                      "The file to write: .model, .glb, .gltf or .npz [the digest with .model]");
   AddFileFormat(command, options->format);

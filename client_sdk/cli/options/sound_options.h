@@ -13,7 +13,6 @@ namespace carillon::cli {
 /// record`.
 void AddVolume(CLI::App& app, Program& program);
 void AddStop(CLI::App& app, Program& program);
-void AddTop(CLI::App& app, Program& program);
 void AddSceneRecord(CLI::App& scene, Program& program);
 
 }  // namespace carillon::cli

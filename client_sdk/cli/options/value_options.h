@@ -12,6 +12,10 @@ class Option;
 
 namespace carillon::cli {
 
+/// The description of an argument that names a model.
+inline constexpr char kModelName[] =
+    "The name, the label, or the first digits of the digest of a model";
+
 /// The description of the values that ReadGain reads.
 inline constexpr char kGainForm[] = "a factor such as 0.5, or decibels: --gain=-6dB";
 
