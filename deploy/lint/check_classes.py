@@ -12,7 +12,6 @@ import project
 CLASS = re.compile(r"^ *(?:template <[^;{]*> *)?(?:class|struct)(?: [A-Z_]+(?:\([^)]*\))?)? (\w+)[^;(]*{", re.M)
 MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?:\w+::)*~?\w+\(", re.M)
 APART = {
-    "server/mode_database/model_collection.cc",
     "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
     "client_sdk/cpp/internal/grpc_client_streams.cc",
 }
