@@ -175,9 +175,8 @@ std::shared_ptr<const Transfer> TransferStore::Find(const ModalModel& model,
     return std::abs(
         std::log(material_m_per_s / (header.speed_ratio() * header.sound_speed_m_per_s())));
   };
-  MutexLock lock(&cache_mutex_);
   std::shared_ptr<const Transfer> transfer;
-  const auto find = [&](SqliteConnection& connection) ABSL_EXCLUSIVE_LOCKS_REQUIRED(cache_mutex_) {
+  const auto find = [&](SqliteConnection& connection) {
     ASSIGN_OR_RETURN(const std::vector<TransferRow> rows, SelectRows(connection, model.revision));
     const TransferRow* nearest = nullptr;
     for (const TransferRow& row : rows) {
@@ -185,22 +184,31 @@ std::shared_ptr<const Transfer> TransferStore::Find(const ModalModel& model,
       if (nearest == nullptr || distance(row) < distance(*nearest)) nearest = &row;
     }
     if (nearest == nullptr) return absl::OkStatus();
-    auto& [xxh3, cached] = cache_[{model.revision, nearest->step}];
-    if (xxh3 == nearest->xxh3) transfer = cached.lock();
+    const Key key(model.revision, nearest->step);
+    transfer = Share(key, nearest->xxh3, nullptr);
     if (transfer != nullptr) return absl::OkStatus();
     ASSIGN_OR_RETURN(const auto stored, ReadRow(connection, model.revision, *nearest));
     if (!stored.has_value() || stored->header().mode_count() != model.mode_count()) {
       return absl::OkStatus();
     }
-    transfer = std::make_shared<const Transfer>(stored->Decode());
-    xxh3 = nearest->xxh3;
-    cached = transfer;
+    transfer = Share(key, nearest->xxh3, std::make_shared<const Transfer>(stored->Decode()));
     return absl::OkStatus();
   };
   // A database that cannot be read leaves the object with the paper's coupling.
   database_->Read(find).IgnoreError();
-  std::erase_if(cache_, [](const auto& entry) { return entry.second.second.expired(); });
   return transfer;
+}
+
+std::shared_ptr<const Transfer> TransferStore::Share(Key key, int64_t xxh3,
+                                                     std::shared_ptr<const Transfer> read) {
+  const MutexLock lock(&cache_mutex_);
+  std::erase_if(cache_, [](const auto& entry) { return entry.second.second.expired(); });
+  const auto cached = cache_.find(key);
+  if (cached != cache_.end() && cached->second.first == xxh3) {
+    if (auto transfer = cached->second.second.lock()) return transfer;
+  }
+  if (read != nullptr) cache_[key] = {xxh3, read};
+  return read;
 }
 
 }  // namespace carillon

@@ -88,10 +88,15 @@ class TransferStore {
  private:
   using Key = std::pair<int64_t, int64_t>;  // revision, step number
 
+  /// Returns the transfer in memory whose bytes have this hash; if there is none, keeps `read`,
+  /// which may be null, and returns it.
+  std::shared_ptr<const Transfer> Share(Key key, int64_t xxh3,
+                                        std::shared_ptr<const Transfer> read);
+
   Database* database_;
   const Clock* clock_;
   ReplaceableCallback<const std::string&> on_stored_;
-  Mutex cache_mutex_;
+  Mutex cache_mutex_;  // never locked while the disk is read
   std::map<Key, std::pair<int64_t, std::weak_ptr<const Transfer>>> cache_
       ABSL_GUARDED_BY(cache_mutex_);  // each transfer with the hash of its bytes
 };
