@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/live_output/device_keeper.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,6 +16,8 @@ constexpr std::chrono::milliseconds kCheckPeriod(20);
 constexpr std::chrono::milliseconds kNullPeriod(100);
 /// A sound server that has come back plays after at most this period and the time to open a device.
 constexpr std::chrono::milliseconds kTryPeriod(500);
+/// The longest period while there has never been a sound card: each attempt starts a process.
+constexpr std::chrono::seconds kRareTryPeriod(10);
 
 /// Returns whether a device that cannot be opened may appear later. A file that cannot be written
 /// and a meaningless specification are errors of the configuration.
@@ -45,6 +48,7 @@ DeviceKeeper::DeviceKeeper(const DeviceSettings& settings, FrameSource& source, 
       clock_(clock),
       log_(std::move(log)),
       wake_(std::move(wake)),
+      try_period_(kTryPeriod),
       missed_(settings.specification != "auto") {}
 
 DeviceKeeper::~DeviceKeeper() {
@@ -125,12 +129,14 @@ void DeviceKeeper::PlayOnNull() {
 void DeviceKeeper::TryWanted() {
   if (clock_.Monotonic() < next_try_) return;
   absl::StatusOr<std::unique_ptr<AudioDevice>> device = OpenDevice(settings_, clock_);
-  next_try_ = clock_.Monotonic() + kTryPeriod;
+  next_try_ = clock_.Monotonic() + try_period_;
   if (!device.ok()) {
     const MutexLock lock(&mutex_);
+    if (!missed_) try_period_ = std::min<std::chrono::nanoseconds>(2 * try_period_, kRareTryPeriod);
     message_ = NoSound(device.status());  // not logged, because it may change with each attempt
     return;
   }
+  try_period_ = kTryPeriod;
   if (wake_) wake_();
   PlayOnWanted(*std::move(device));
 }

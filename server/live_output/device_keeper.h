@@ -31,7 +31,8 @@ struct DeviceState {
 };
 
 /// Plays a source on the wanted device. While that device is away, the null device pulls from the
-/// source, so that time goes on, and the keeper tries to open the wanted device twice a second.
+/// source, so that time goes on, and the keeper tries to open the wanted device twice a second, or
+/// more and more rarely, up to every ten seconds, if "auto" has never found a sound card.
 ///
 ///     wanted device plays --Check fails--> null pulls --opened and started--> wanted device plays
 ///
@@ -91,6 +92,7 @@ class DeviceKeeper {
   Clock& clock_;
   const Log log_;
   const Wake wake_;
+  std::chrono::nanoseconds try_period_;
   std::chrono::nanoseconds next_try_{0};
   /// Held while a device is started, stopped or replaced, which takes up to half a second.
   Mutex change_mutex_ ABSL_ACQUIRED_BEFORE(mutex_);

@@ -111,7 +111,7 @@ class DeviceLifeTest(unittest.TestCase):
                 self.serve(device, server.environment)
                 self.assertEqual(self.scene.mixer().device, "null")
                 server.start()
-                wait_until(self.plays, BACK_S)
+                wait_until(self.plays, BACK_S + 10)
                 self.assert_sounds(server)
                 self.scene.stop()
                 self.stop_in_time()

@@ -4,8 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <semaphore>
+#include <thread>
 
 namespace carillon {
 namespace {
@@ -18,6 +22,19 @@ class PulledSource final : public FrameSource {
 
  private:
   std::counting_semaphore<> pulled_{0};
+};
+
+/// A clock on which a hundred seconds pass within one.
+class FastClock final : public Clock {
+ public:
+  std::chrono::nanoseconds Monotonic() const noexcept override { return 100 * clock_.Monotonic(); }
+  int64_t UnixMs() const noexcept override { return clock_.UnixMs(); }
+  void SleepUntil(std::chrono::nanoseconds time) override {
+    std::this_thread::sleep_for((time - Monotonic()) / 100);
+  }
+
+ private:
+  SystemClock clock_;
 };
 
 DeviceSettings Settings(const std::string& specification, const std::string& program = "") {
@@ -50,6 +67,26 @@ TEST_F(DeviceKeeperTest, WithoutAnySoundCardAutoIsNoFault) {
   ASSERT_TRUE(keeper.ok()) << keeper.status();
   EXPECT_TRUE((*keeper)->state().plays);
   EXPECT_NE((*keeper)->state().message, "");
+}
+
+TEST_F(DeviceKeeperTest, AutoLooksMoreAndMoreRarelyForTheFirstSoundCard) {
+  const std::filesystem::path folder = testing::TempDir() + "rare_tries";
+  std::filesystem::create_directories(folder);
+  std::filesystem::remove(folder / "tries");
+  std::ofstream(folder / "audio") << "#!/bin/sh\necho >> " << (folder / "tries").string() << "\n";
+  std::filesystem::permissions(folder / "audio", std::filesystem::perms::owner_all);
+  FastClock clock;
+  {
+    const auto keeper = DeviceKeeper::Start(Settings("auto", folder / "audio"), source_, clock,
+                                            [](const std::string&) {});
+    ASSERT_TRUE(keeper.ok()) << keeper.status();
+    clock.SleepUntil(clock.Monotonic() + std::chrono::seconds(60));
+  }
+  std::ifstream tries(folder / "tries");
+  const auto count = std::count(std::istreambuf_iterator<char>(tries), {}, '\n');
+  // At the start, after 0, 0.5, 1.5, 3.5, 7.5 and 15.5 s, and then every ten seconds at most.
+  EXPECT_GE(count, 2);
+  EXPECT_LE(count, 13);
 }
 
 TEST_F(DeviceKeeperTest, RefusesAConfigurationThatCannotBecomeRight) {
