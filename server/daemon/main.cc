@@ -13,7 +13,6 @@
 #include <functional>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -206,9 +205,11 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   LogOutput(rooms.output);
   guard.CompleteStart();
   AnnounceReady(rooms.server);
-  std::optional<Watchdog> watchdog;
-  if (std::getenv("NOTIFY_SOCKET") != nullptr) watchdog.emplace(rooms.output);  // systemd listens
-  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo);
+  Watchdog watchdog(rooms.output);
+  RepeatedWork reports{.period = watchdog.period(), .work = {}};
+  // systemd listens.
+  if (std::getenv("NOTIFY_SOCKET") != nullptr) reports.work = [&] { watchdog.Report(); };
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo, reports);
   ExpectEnd();
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");

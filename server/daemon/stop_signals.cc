@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -109,12 +110,18 @@ void StopGuard::EndNow(const std::string& line) const {
   std::_Exit(EXIT_SUCCESS);
 }
 
-void WaitForStop(const std::function<void()>& reload, const StopLog& log) {
+void WaitForStop(const std::function<void()>& reload, const StopLog& log,
+                 const RepeatedWork& repeated) {
   const sigset_t signals = ServedSignals();
   const sigset_t stops = StopSignals();
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(repeated.period);
+  const timespec period{.tv_sec = seconds.count(),
+                        .tv_nsec = std::chrono::nanoseconds(repeated.period - seconds).count()};
   int received = 0;
   while (received <= 0) {
-    received = sigwaitinfo(&signals, nullptr);
+    received =
+        repeated.work ? sigtimedwait(&signals, nullptr, &period) : sigwaitinfo(&signals, nullptr);
+    if (received < 0 && errno == EAGAIN && repeated.work) repeated.work();
     if (received != SIGHUP) continue;
     reload();
     received = sigtimedwait(&stops, nullptr, &kReloadPeriod);

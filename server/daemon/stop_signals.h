@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <string>
 #include <thread>
@@ -45,8 +46,15 @@ class StopGuard {
   std::thread thread_;
 };
 
+/// Work that is done again and again while WaitForStop waits.
+struct RepeatedWork {
+  std::chrono::microseconds period;
+  std::function<void()> work;  ///< may be empty
+};
+
 /// Returns on SIGINT, SIGTERM and SIGQUIT. SIGHUP calls `reload`, but at most once a second:
 /// signals that come sooner cause one call together.
-void WaitForStop(const std::function<void()>& reload, const StopLog& log);
+void WaitForStop(const std::function<void()>& reload, const StopLog& log,
+                 const RepeatedWork& repeated);
 
 }  // namespace carillon

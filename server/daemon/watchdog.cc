@@ -17,7 +17,6 @@ using std::chrono::microseconds;
 
 constexpr microseconds kStatusPeriod = std::chrono::seconds(5);
 
-/// A third of systemd's limit, so that one delay does not end the daemon.
 microseconds Period() {
   uint64_t limit_us = 0;
   if (sd_watchdog_enabled(0, &limit_us) <= 0) return kStatusPeriod;
@@ -33,22 +32,14 @@ std::string StatusOf(const OutputState& state) {
 
 }  // namespace
 
-Watchdog::Watchdog(LiveOutput& output) : output_(output), thread_([this] { Run(); }) {}
+Watchdog::Watchdog(LiveOutput& output)
+    : output_(output), period_(Period()), last_frame_(output.mixer().frame()) {}
 
-Watchdog::~Watchdog() {
-  stop_.release();
-  thread_.join();
-}
-
-void Watchdog::Run() {
-  const microseconds period = Period();
-  uint64_t last_frame = output_.mixer().frame();
-  while (!stop_.try_acquire_for(period)) {
-    const uint64_t frame = output_.mixer().frame();
-    const std::string status = StatusOf(output_.state());
-    sd_notify(0, (frame != last_frame ? absl::StrCat("WATCHDOG=1\n", status) : status).c_str());
-    last_frame = frame;
-  }
+void Watchdog::Report() {
+  const uint64_t frame = output_.mixer().frame();
+  const std::string status = StatusOf(output_.state());
+  sd_notify(0, (frame != last_frame_ ? absl::StrCat("WATCHDOG=1\n", status) : status).c_str());
+  last_frame_ = frame;
 }
 
 }  // namespace carillon

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <semaphore>
-#include <thread>
+#include <chrono>
+#include <cstdint>
 
 #include "server/live_output/live_output.h"
 
@@ -15,17 +15,16 @@ class Watchdog {
   /// `output` must outlive the watchdog.
   explicit Watchdog(LiveOutput& output);
 
-  /// Joins the thread. From then on only systemd's time limit for a stop applies.
-  ~Watchdog();
-  Watchdog(const Watchdog&) = delete;
-  Watchdog& operator=(const Watchdog&) = delete;
+  /// The time from one report to the next: at most a third of systemd's limit, so that one delay
+  /// does not end the daemon.
+  std::chrono::microseconds period() const { return period_; }
+
+  void Report();
 
  private:
-  void Run();
-
   LiveOutput& output_;
-  std::binary_semaphore stop_{0};
-  std::thread thread_;
+  const std::chrono::microseconds period_;
+  uint64_t last_frame_;
 };
 
 }  // namespace carillon
