@@ -4,7 +4,6 @@
 
 Each part prints a Markdown table:
   compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
-  roofline  each stage beside the least time that this machine's arithmetic and memory allow
   calculix  CalculiX on the same meshes: frequencies
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
@@ -29,7 +28,6 @@ import curved
 import estimates
 import growth
 import packages
-import roofline
 import users
 
 
@@ -54,7 +52,7 @@ def fair_environment():
     return environment
 
 
-PARTS = {"compare": compare.compare, "roofline": roofline.roofline,
+PARTS = {"compare": compare.compare,
          "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
          "growth": growth.growth,
