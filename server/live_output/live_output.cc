@@ -32,7 +32,6 @@ MixerSettings MixerSettingsOf(const OutputSettings& settings, const Clock& clock
           .block_frame_count = format.block_frame_count,
           .channel_count = format.channel_count,
           .clock = &clock,
-          .gain = settings.gain,
           .full_scale_pa = settings.full_scale_pa,
           .wake = std::move(wake)};
 }
@@ -59,7 +58,6 @@ LiveOutput::LiveOutput(const OutputSettings& settings, Clock& clock, Log log)
       final_fade_(settings.format),
       needed_at_(clock.Monotonic()),
       silence_(kBlocksTogether * settings.format.block_size()),
-      volume_{.gain = settings.gain},
       loudness_(settings.format.sample_rate_hz, settings.format.channel_count),
       loss_log_(settings.format.sample_rate_hz, log_) {}
 

@@ -39,7 +39,6 @@ struct OutputSettings {
   std::string device = "auto";
   /// Path of carillon-audio, which opens sound cards.
   std::string device_program{};
-  double gain = 1;                      ///< gain of the output, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
   /// Time without sound, streams and listeners after which the null device pauses. It is longer
   /// than the loudness meter's memory.
