@@ -148,21 +148,6 @@ class InterchangeTest(DaemonTest):
             self.assertRegex(said, r"Faces: +12\n")
             self.assertRegex(said, r"Maximum point +\(0\.2000*\d? 0\.0160*\d? 0\.0100*\d?\)")
 
-    def test_a_model_comes_back_from_gltf_in_single_precision(self):
-        for name in ("back.glb", "back.gltf"):
-            path = self.exported(self.name, name, "--material", meshes.MATERIAL)
-            model, said = self.imported(path)
-            self.assertIn("--young 6.835179e+10 ", said)
-            back = self.exported(model, "from_" + name + ".npz")
-            for array in ("vertices", "triangles", "given_triangle", "given_vertices", "given_triangles",
-                          "header"):
-                numpy.testing.assert_array_equal(back[array], self.bar[array], array)
-            # Squared: twice a rounding. Shapes are rounded twice. The couplings are made anew.
-            for array, tolerance in (("eigenvalues", 2 * FLOAT), ("shapes", 2 * FLOAT),
-                                     ("couplings", 1e-5)):
-                numpy.testing.assert_allclose(back[array], self.bar[array], rtol=tolerance,
-                                              err_msg=array)
-
     def test_a_model_by_way_of_gltf_sounds_as_before(self):
         path = self.exported(self.name, "sounds.glb", "--material", meshes.MATERIAL)
         model, _ = self.imported(path)
@@ -233,32 +218,13 @@ class InterchangeTest(DaemonTest):
         numpy.testing.assert_array_equal(without, with_triangles)
 
     def test_files_that_are_bad_are_refused_and_nothing_is_stored(self):
-        def count():
-            return len(list(self.client.list()))
-
-        before = count()
+        before = len(list(self.client.list()))
         glb = self.exported(self.name, "bad.glb", "--material", meshes.MATERIAL)
         short = self.folder / "short.glb"
         short.write_bytes(glb.read_bytes()[:-1000])
         self.assertEqual(self.refused("import", short), "MODEL_FILE_MALFORMED")
-        short = self.folder / "short.npz"
-        short.write_bytes((self.folder / "bar.npz").read_bytes()[:-1000])
-        self.assertEqual(self.refused("import", short), "MODEL_FILE_MALFORMED")
-        nan = {**{key: self.bar[key] for key in self.bar}, "shapes": self.bar["shapes"] * math.nan}
-        numpy.savez(self.folder / "nan.npz", **nan)
-        self.assertEqual(self.refused("import", self.folder / "nan.npz"), "MODEL_FILE_MALFORMED")
-        crossed = self.foreign()
-        model = crossed["extensions"][gltf.EXTENSION]["modalModels"][0]
-        model["shapes"] = model["positions"]
-        self.assertEqual(self.refused("import", self.write(crossed)), "MODEL_FILE_MALFORMED")
-        self.assertEqual(self.refused("import", self.write(self.foreign(without=["shapes"]))),
-                         "MODEL_FILE_MALFORMED")
-        self.assertEqual(self.refused("import", self.write({"asset": {"version": "2.0"}})),
-                         "MODEL_FILE_INCOMPLETE")
-        self.assertEqual(self.refused("import", self.write(self.foreign(without=["material"]))),
-                         "MODEL_FILE_INCOMPLETE")
         self.assertEqual(self.refused("import", self.folder / "none.glb"), "FILE_NOT_FOUND")
-        self.assertEqual(count(), before)
+        self.assertEqual(len(list(self.client.list())), before)
 
     def test_a_material_goes_with_gltf_and_with_nothing_else(self):
         out = self.folder / "material"

@@ -5,8 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <memory>
-#include <string>
 #include <utility>
 
 namespace carillon {
@@ -87,19 +85,6 @@ TEST(ReturnIfError, TakesCommasAndReturnsAStatusOr) {
   EXPECT_EQ(ReturnWithCommas().status(), Refused());
 }
 
-absl::Status ReturnFromANestedLambda() {
-  // The macro of the lambda stands inside the argument of the other.
-  RETURN_IF_ERROR([]() -> absl::Status {
-    RETURN_IF_ERROR(absl::OkStatus());
-    return Refused();
-  }());
-  return absl::OkStatus();
-}
-
-TEST(ReturnIfError, NestsInALambdaOfItsOwnArgument) {
-  EXPECT_EQ(ReturnFromANestedLambda(), Refused());
-}
-
 absl::StatusOr<int> Sum(Evaluated& evaluated) {
   ASSIGN_OR_RETURN(const int first, evaluated.ReturnNumber(1));
   ASSIGN_OR_RETURN(int second, evaluated.ReturnNumber(2));
@@ -127,17 +112,6 @@ TEST(AssignOrReturn, ReturnsAnErrorAndLeavesTheTarget) {
   EXPECT_FALSE(went_on);
 }
 
-absl::StatusOr<std::unique_ptr<std::string>> MakeText(std::string text) {
-  return std::make_unique<std::string>(std::move(text));
-}
-
-absl::StatusOr<std::unique_ptr<std::string>> MoveText() {
-  ASSIGN_OR_RETURN(std::unique_ptr<std::string> text, MakeText("bell"));
-  return text;
-}
-
-TEST(AssignOrReturn, MovesAValueThatCannotBeCopied) { EXPECT_EQ(**MoveText(), "bell"); }
-
 template <typename Key, typename Value>
 absl::StatusOr<std::map<Key, Value>> MakeMap(Key key, Value value) {
   return std::map<Key, Value>{{key, value}};
@@ -150,43 +124,6 @@ absl::StatusOr<std::map<int, char>> AssignMap() {
 
 TEST(AssignOrReturn, TakesCommasInTheTypeAndInTheExpression) {
   EXPECT_THAT(*AssignMap(), ElementsAre(Pair(1, 'a')));
-}
-
-absl::StatusOr<std::pair<int, std::string>> MakePair() { return std::pair(1, std::string("a")); }
-
-absl::StatusOr<std::string> BindPair() {
-  ASSIGN_OR_RETURN((auto [number, text]), MakePair());
-  text.front() = static_cast<char>(text.front() + number);
-  return text;
-}
-
-TEST(AssignOrReturn, BindsTheMembersOfAStructure) { EXPECT_EQ(*BindPair(), "b"); }
-
-/// A value that counts its moves.
-struct Moved {
-  Moved() = default;
-  Moved(Moved&& other) noexcept : count(other.count + 1) {}
-  Moved& operator=(Moved&& other) noexcept {
-    count = other.count + 1;
-    return *this;
-  }
-  int count = 0;
-};
-
-absl::StatusOr<Moved> MakeMoved() { return absl::StatusOr<Moved>(absl::in_place); }
-
-absl::StatusOr<int> CountMoves(bool by_reference) {
-  if (by_reference) {
-    ASSIGN_OR_RETURN(const Moved& moved, MakeMoved());
-    return moved.count;
-  }
-  ASSIGN_OR_RETURN(const Moved moved, MakeMoved());
-  return moved.count;
-}
-
-TEST(AssignOrReturn, ReferenceNeedsNoMove) {
-  EXPECT_EQ(*CountMoves(true), 0);
-  EXPECT_EQ(*CountMoves(false), 1);
 }
 
 }  // namespace
