@@ -11,7 +11,6 @@ import tempfile
 import time
 import unittest
 
-import meshes
 from carillon.v1 import audio_service_pb2, scene_service_pb2
 from daemon import BIN, Daemon
 
@@ -94,48 +93,6 @@ class LevelTest(unittest.TestCase):
         model = self.daemon.command("model", "import", self.folder / "missing.gltf", check=False)
         self.assertNotEqual(model.returncode, 0)
         self.assertEqual(self.log(), "")
-
-
-class SessionTest(unittest.TestCase):
-    def test_the_log_tells_of_a_session(self):
-        with tempfile.TemporaryDirectory(prefix="carillon-") as scratch:
-            folder = pathlib.Path(scratch)
-            daemon = Daemon(folder, "--listen", "127.0.0.1:0")
-            self.addCleanup(daemon.kill)
-            self.run_session(daemon)
-            self.assertEqual(daemon.stop(), 0)
-            log = (folder / "log").read_text()
-        by = "caller=local peer=unix:pid-[0-9]+\n"
-        model, job = ("model=modalModels/[0-9a-f]{64} ", "job=jobs/[0-9a-f]{64} ")
-        for expected in (f" info: job_submitted {job}label=bar state=[a-z]+ {by}",
-                         f" info: model_stored {model}label=bar modes=[0-9]+ bytes=[0-9]+\n",
-                         f" warning: job_failed {job}reason=MESH_NOT_CLOSED message=\".*\" label=open client=",
-                         f" info: model_deleted {model}{by}",
-                         f" info: model_imported {model}modes=[0-9]+ bytes=[0-9]+ {by}",
-                         f" info: database_backed_up outcome=sent bytes=[0-9]+ {by}",
-                         f" info: model_deleted {model}bytes=[0-9]+ cause=collection {by}",
-                         f" info: models_collected count=2 bytes=[0-9]+ mesh_count=[0-9]+ mesh_bytes=[0-9]+ {by}",
-                         " warning: a call of /carillon.v1.AdminService/CollectGarbage from ipv4:127.0.0.1:[0-9]+ was "
-                         "refused: CREDENTIAL_MISSING: "):
-            self.assertRegex(log, expected)
-
-    @staticmethod
-    def run_session(daemon):
-        """Computes a model, exports, deletes and imports it, backs up and collects; a job fails, a call is refused."""
-        bar, opened, file = (daemon.folder / name for name in ("bar.obj", "open.obj", "bar.model"))
-        bar.write_bytes(meshes.bar())
-        vertices, triangles = meshes.box((0.10, 0.03, 0.02))
-        opened.write_bytes(meshes.obj(vertices, triangles[1:]))
-        daemon.command("model", "create", bar, "--material", meshes.MATERIAL, "--label", "bar", "--wait")
-        daemon.command("model", "create", opened, "--material", meshes.MATERIAL, "--wait", check=False)
-        daemon.command("model", "export", "bar", "--out", file)
-        daemon.command("model", "delete", "bar")
-        daemon.command("model", "import", file)
-        daemon.command("db", "backup", daemon.folder / "copy.db")
-        collect = ("db", "collect", "--delete-unpinned")
-        subprocess.run([BIN / "carillon", "--server", daemon.listening[-1].split()[-1], *collect], check=False,
-                       capture_output=True)
-        daemon.command(*collect)
 
 
 def namespaces_permitted():
