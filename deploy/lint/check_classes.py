@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks that a class has one pair of files: a.cc defines members of classes that a.h, or a.cc itself, declares.
 
-A class that needs a second file has a second class inside. APART lists those that are not yet split.
+A class that needs a second file has a second class inside.
 """
 
 import re
@@ -11,10 +11,6 @@ import project
 
 CLASS = re.compile(r"^ *(?:template <[^;{]*> *)?(?:class|struct)(?: [A-Z_]+(?:\([^)]*\))?)? (\w+)[^;(]*{", re.M)
 MEMBER = re.compile(r"^(?!using|namespace|static|#|//)[\w][^\n;={}]*?\b(\w+)::(?:\w+::)*~?\w+\(", re.M)
-APART = {
-    "client_sdk/cpp/internal/grpc_client_files.cc", "client_sdk/cpp/internal/grpc_client_health.cc",
-    "client_sdk/cpp/internal/grpc_client_streams.cc",
-}
 
 
 def declared(text):
@@ -37,8 +33,7 @@ def check(root):
             if stems and path.stem not in stems and found[1] not in own:
                 line = text.count("\n", 0, found.start()) + 1
                 name = path.relative_to(root)
-                if str(name) not in APART:
-                    yield f"{name}:{line}: defines a member of {found[1]}, which {sorted(stems)[0]}.h declares"
+                yield f"{name}:{line}: defines a member of {found[1]}, which {sorted(stems)[0]}.h declares"
                 break
 
 
