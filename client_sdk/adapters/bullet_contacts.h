@@ -20,6 +20,9 @@ class BulletContacts {
   /// be that of its modal model.
   void AddObject(const btCollisionObject& body, uint32_t handle) { rows_.AddObject(&body, handle); }
 
+  /// Lets `body` sound no more. Call it before the body is destroyed.
+  void RemoveObject(const btCollisionObject& body) { rows_.RemoveObject(&body); }
+
   /// Appends the contacts of the substep that has just been solved. Call it from the world's
   /// internal tick callback, with a ContactStep for each substep.
   void Read(btDispatcher& dispatcher, v1::ContactStep& step);

@@ -57,8 +57,14 @@ double TravelSpeed(const ContactReport& contact) {
 }  // namespace
 
 uint32_t ContactRows::PartnerNumber(const void* body) {
-  const auto next = static_cast<uint32_t>(partners_.size());
-  return partners_.try_emplace(body, next).first->second;
+  const auto [partner, is_new] = partners_.try_emplace(body, partner_count_);
+  if (is_new) ++partner_count_;
+  return partner->second;
+}
+
+void ContactRows::RemoveObject(const void* body) {
+  handles_.erase(body);
+  partners_.erase(body);
 }
 
 void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {

@@ -54,6 +54,10 @@ class ContactRows {
   /// Lets `body` sound as the object `handle` of the scene from now on.
   void AddObject(const void* body, uint32_t handle) { handles_[body] = handle; }
 
+  /// Lets `body` sound no more, and forgets its number as a partner, because another body may have
+  /// its address later.
+  void RemoveObject(const void* body);
+
   /// Appends a row for the contact unless neither body sounds. If both sound, the one with the
   /// lower handle is the object of the row and the other its second object, in whichever order the
   /// engine reports them.
@@ -74,6 +78,7 @@ class ContactRows {
   ContactSettings settings_;
   std::map<const void*, uint32_t> handles_;
   std::map<const void*, uint32_t> partners_;  // a number for every body met
+  uint32_t partner_count_ = 0;
 };
 
 }  // namespace carillon::adapters

@@ -2,13 +2,14 @@
 'use strict';
 
 /** Vectors are arrays [x, y, z] in the world's frame, quaternions arrays [w, x, y, z]. */
-const minus = (a, b) => a.map((x, i) => x - b[i]);
-const plus = (a, b) => a.map((x, i) => x + b[i]);
-const times = (a, factor) => a.map((x) => x * factor);
+const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const plus = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const times = (a, factor) => [a[0] * factor, a[1] * factor, a[2] * factor];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const tangential = (v, normal) => minus(v, times(normal, dot(v, normal)));
-const length = (v) => Math.hypot(...v);
+const length = (v) => Math.sqrt(dot(v, v)); // much quicker than Math.hypot
+const ZERO = [0, 0, 0];
 
 // A striker of this mass changes the reduced mass of no real body.
 const IMMOVABLE_KG = 1e6;
@@ -18,9 +19,8 @@ const IMMOVABLE_KG = 1e6;
  * body stands still. `velocity` is that of the centre of mass.
  */
 function velocityAt(body, point) {
-  if (!body.velocity) return [0, 0, 0];
-  const turning = cross(body.angularVelocity ?? [0, 0, 0], minus(point, body.centre));
-  return body.velocity.map((v, i) => v + turning[i]);
+  if (!body.velocity) return ZERO;
+  return plus(body.velocity, cross(body.angularVelocity ?? ZERO, minus(point, body.centre)));
 }
 
 /** The velocity of the first body's surface over the second's. */
@@ -34,7 +34,7 @@ function slipAt({ first, second, point, normal }) {
  */
 function travelSpeed(contact) {
   const { first, second, point, normal } = contact;
-  const roll = minus(first.angularVelocity ?? [0, 0, 0], second.angularVelocity ?? [0, 0, 0]);
+  const roll = minus(first.angularVelocity ?? ZERO, second.angularVelocity ?? ZERO);
   const lever = (body) => (body.centre ? Math.abs(dot(minus(point, body.centre), normal)) : 0);
   return length(slipAt(contact)) + length(tangential(roll, normal)) * Math.max(lever(first), lever(second));
 }
@@ -48,6 +48,7 @@ class ContactRows {
     this.settings = settings;
     this.handles = new Map();
     this.partners = new Map();
+    this.partnerCount = 0;
   }
 
   /** Lets a body sound as the object with this handle; its frame must be that of its modal model. */
@@ -55,8 +56,17 @@ class ContactRows {
     this.handles.set(key, handle);
   }
 
+  /** Lets a body sound no more. An engine may give its key to another body later. */
+  removeObject(key) {
+    this.handles.delete(key);
+    this.partners.delete(key);
+  }
+
   partnerNumber(key) {
-    if (!this.partners.has(key)) this.partners.set(key, this.partners.size);
+    if (!this.partners.has(key)) {
+      this.partners.set(key, this.partnerCount);
+      this.partnerCount += 1;
+    }
     return this.partners.get(key);
   }
 
@@ -64,8 +74,10 @@ class ContactRows {
    * Returns the rows of one contact, in which `impulse` acts on the first body over the step: none where neither body
    * sounds. If both do, the one with the lower handle is the object. `pointOnSecond` is `point` unless it is given.
    */
-  rows({ first, second, point, pointOnSecond = point, normal, impulse }) {
-    const [one, other] = [this.handles.get(first.key), this.handles.get(second.key)];
+  rows(contact) {
+    const { first, second, point, pointOnSecond = point, normal, impulse } = contact;
+    const one = this.handles.get(first.key);
+    const other = this.handles.get(second.key);
     if (one === undefined && other === undefined) return [];
     if (one === undefined || other < one) {
       return this.rows({ first: second, second: first, point: pointOnSecond, pointOnSecond: point,
@@ -73,12 +85,17 @@ class ContactRows {
     }
     const row = { object: one, partner: this.partnerNumber(second.key), point, impulse };
     if (this.settings.roughness) {
-      const travel = travelSpeed({ first, second, point, normal });
-      row.roughness = { ...this.settings.roughness, travel_speed_m_per_s: travel };
+      const { depth, irregularity_length_m } = this.settings.roughness;
+      row.roughness = { depth, travel_speed_m_per_s: travelSpeed(contact) };
+      if (irregularity_length_m !== undefined) row.roughness.irregularity_length_m = irregularity_length_m;
     }
-    if (other !== undefined) return [{ ...row, second: { object: other, point: pointOnSecond } }];
-    const striker = { striker: this.settings.striker ?? '', striker_mass_kg: second.massKg ?? IMMOVABLE_KG };
-    return [{ ...row, striker }];
+    if (other !== undefined) {
+      row.second = { object: other, point: pointOnSecond };
+    } else {
+      row.striker = this.settings.striker ?? '';
+      row.striker_mass_kg = second.massKg ?? IMMOVABLE_KG;
+    }
+    return [row];
   }
 
   /** Poses of the objects as columns; `poseOf` returns [position, orientation] of a body. */
@@ -93,29 +110,42 @@ class ContactRows {
  * Friction of contacts, for engines that report impulses along the normal alone. Each contact is { first, second, point,
  * normal, along, friction }, with `normal` pointing towards the first body and `along` the impulse on it. What the step
  * added to the momentum of a body, less gravity and the impulses along the normals, is friction, which its contacts
- * share as they share the load; none exceeds Coulomb's. Returns the contacts with their whole `impulse`.
+ * share as they share the load; none exceeds Coulomb's. Gives each contact its whole `impulse`, and returns them.
  */
 function withFriction(contacts, before, gravity, stepS) {
-  const loads = new Map();
-  for (const { first, second, normal, along } of contacts) {
-    for (const [body, sign] of [[first, 1], [second, -1]]) {
-      const load = loads.get(body.key) ?? { along: 0, normal: [0, 0, 0] };
-      loads.set(body.key, { along: load.along + along, normal: plus(load.normal, times(normal, sign * along)) });
+  const rests = new Map(); // Of each body: the impulses along its normals, and what else its momentum gained.
+  const restOf = (body) => {
+    let rest = rests.get(body.key);
+    if (rest === undefined) {
+      const earlier = before.get(body.key);
+      const known = earlier && earlier.velocity && body.massKg;
+      const gained = known
+        ? times(minus(minus(body.velocity, earlier.velocity), times(gravity, stepS)), body.massKg) : ZERO;
+      rest = { known, along: 0, gained };
+      rests.set(body.key, rest);
     }
+    return rest;
+  };
+  const addUp = (body, along, normal, sign) => {
+    const rest = restOf(body);
+    rest.along += along;
+    if (rest.known) rest.gained = minus(rest.gained, times(normal, sign * along));
+  };
+  for (const { first, second, normal, along } of contacts) {
+    addUp(first, along, normal, 1);
+    addUp(second, along, normal, -1);
   }
-  return contacts.map((contact) => {
+  for (const contact of contacts) {
     const { first, second, normal, along, friction } = contact;
     const isFirst = (first.massKg ?? Infinity) <= (second.massKg ?? Infinity);
-    const body = isFirst ? first : second;
-    const earlier = before.get(body.key);
-    if (!earlier || !body.massKg) return { ...contact, impulse: times(normal, along) };
-    const gained = minus(minus(body.velocity, earlier.velocity), times(gravity, stepS));
-    const load = loads.get(body.key);
-    const rest = tangential(minus(times(gained, body.massKg), load.normal), normal);
-    const across = times(rest, (isFirst ? 1 : -1) * along / load.along);
-    const excess = Math.max(1, length(across) / (friction * along || Infinity));
-    return { ...contact, impulse: plus(times(normal, along), times(across, friction ? 1 / excess : 0)) };
-  });
+    const rest = restOf(isFirst ? first : second);
+    contact.impulse = times(normal, along);
+    if (!rest.known || !friction) continue;
+    const across = times(tangential(rest.gained, normal), (isFirst ? 1 : -1) * along / rest.along);
+    const excess = Math.max(1, length(across) / (friction * along));
+    contact.impulse = plus(contact.impulse, times(across, 1 / excess));
+  }
+  return contacts;
 }
 
 function reducedMassKg(first, second) {

@@ -35,6 +35,13 @@ class HavokContacts {
     this.posesBefore.set(body[0], this.poseOf(body));
   }
 
+  /** Lets a body sound no more. Call it before HP_Body_Release(body). */
+  removeObject(body) {
+    this.contactRows.removeObject(body[0]);
+    this.before.delete(body[0]);
+    this.posesBefore.delete(body[0]);
+  }
+
   /**
    * Returns what a step of a stream or trace takes. Call it after HP_World_Step(world, stepS). The poses are those from
    * before the step, to which the points of Havok's events belong.

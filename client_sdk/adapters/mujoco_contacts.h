@@ -23,6 +23,9 @@ class MujocoContacts {
   /// from now on. The frame of the body must be that of its modal model.
   void AddObject(int body, uint32_t handle) { rows_.AddObject(KeyOf(body), handle); }
 
+  /// Lets the body sound no more.
+  void RemoveObject(int body) { rows_.RemoveObject(KeyOf(body)); }
+
   /// Appends the contacts of the step that mj_step has just computed.
   void Read(const mjData& data, v1::ContactStep& step);
 

@@ -23,6 +23,9 @@ class OdeContacts {
   /// be that of its modal model.
   void AddObject(dBodyID body, uint32_t handle) { rows_.AddObject(body, handle); }
 
+  /// Lets `body` sound no more. Call it before the body is destroyed.
+  void RemoveObject(dBodyID body) { rows_.RemoveObject(body); }
+
   /// Remembers a contact joint and sets its feedback. Call it from the near callback for each
   /// contact joint, after the joint has been attached.
   void Add(dJointID joint, const dContactGeom& geometry);

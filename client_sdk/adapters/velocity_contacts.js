@@ -16,6 +16,10 @@ class VelocityContacts {
     this.contactRows.addObject(key, handle);
   }
 
+  removeObject(key) {
+    this.contactRows.removeObject(key);
+  }
+
   /**
    * Returns the contacts of a step. Each collision is { first, second, point, normal, restitution, friction }: bodies as
    * ContactRows describes them, with their velocities before the collision, and a normal of unit length that points from

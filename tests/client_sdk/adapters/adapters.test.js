@@ -83,6 +83,51 @@ test('the impulses read out of Rapier are the change of momentum, friction inclu
   near(poses.positions[0][0], body.translation().x, 1e-6);
 });
 
+test('a body that was removed from Rapier sounds no more, whether the adapter was told or not', async () => {
+  for (const tell of [true, false]) {
+    const { world, body } = await slidingInRapier();
+    const contacts = new RapierContacts({ roughness: { depth: 0.5 } });
+    const other = world.createRigidBody(rapier.RigidBodyDesc.dynamic().setTranslation(0, 0, 0.045));
+    world.createCollider(rapier.ColliderDesc.cuboid(0.1, 0.07, 0.015).setMass(2), other);
+    contacts.addObject(body, 1);
+    contacts.addObject(other, 2);
+    for (let i = 0; i < 20; i += 1) {
+      world.step();
+      contacts.read(world);
+    }
+    if (tell) contacts.removeObject(body);
+    world.removeRigidBody(body);
+    contacts.read(world); // its colliders are in the world's pairs until the next step
+    for (let i = 0; i < 60; i += 1) {
+      world.step();
+      const read = contacts.read(world);
+      assert.deepEqual(read.poses.objects, [2]);
+      assert.ok(read.contacts.every(({ object, second }) => object === 2 && !second));
+    }
+    // Rapier gives another body the place of the removed one, which is another body to the adapter.
+    const third = world.createRigidBody(rapier.RigidBodyDesc.dynamic().setTranslation(0, 0, 0.4));
+    world.createCollider(rapier.ColliderDesc.cuboid(0.1, 0.07, 0.015).setMass(2), third);
+    contacts.addObject(third, 1);
+    let struck = 0;
+    for (let i = 0; i < 120; i += 1) {
+      world.step();
+      struck = Math.max(struck, ...contacts.read(world).contacts.map(({ impulse }) => Math.abs(impulse[2])));
+    }
+    assert.ok(struck > 1);
+    world.free();
+  }
+});
+
+test('a partner that is removed loses its number, and no other body has had it', () => {
+  const rows = new ContactRows();
+  rows.addObject('a', 4);
+  const partners = (...keys) => keys.map((key) => rows.rows({ first: still('a'), second: still(key), point: [0, 0, 0],
+    normal: [0, 0, 1], impulse: [0, 0, 3] })[0].partner);
+  assert.deepEqual(partners('b', 'c', 'b'), [0, 1, 0]);
+  rows.removeObject('b');
+  assert.deepEqual(partners('c', 'd', 'b'), [1, 2, 3]);
+});
+
 /** A box of 2 kg that falls on a floor in Havok. */
 async function fallInHavok() {
   const wasmBinary = fs.readFileSync(require.resolve('@babylonjs/havok/lib/umd/HavokPhysics.wasm'));
@@ -123,6 +168,14 @@ test('the impulses read out of Havok are the change of momentum, without those t
     owed = 0;
   }
   assert.ok(most > 0.5); // it has struck
+  contacts.removeObject(body);
+  havok.HP_World_RemoveBody(world, body);
+  havok.HP_Body_Release(body);
+  for (let i = 0; i < 3; i += 1) {
+    havok.HP_World_Step(world, STEP_S);
+    const { contacts: rows, poses } = contacts.read(world, STEP_S);
+    assert.deepEqual([rows, poses.objects], [[], []]);
+  }
 });
 
 /** Contacts of a body of 2 kg, which an event of Havok presses up along z. `velocity` is that after the step. */

@@ -94,6 +94,21 @@ TEST_F(BulletContactsTest, ImpulsesAreTheChangeOfMomentumWithFrictionInTheFrameO
   EXPECT_LT((sum - change).length(), 1e-9);
 }
 
+TEST_F(BulletContactsTest, ABodyThatIsRemovedSoundsNoMoreAndIsNotTouched) {
+  contacts_.AddObject(right_, 4);
+  contacts_.AddObject(left_, 9);
+  contacts_.RemoveObject(left_);
+  Simulate();
+  ASSERT_GT(step_.contacts_size(), 0);
+  for (const v1::Contact& contact : step_.contacts()) {
+    EXPECT_EQ(contact.object(), 4U);
+    EXPECT_FALSE(contact.has_second());
+  }
+  v1::ContactStep step;
+  contacts_.ReadPoses(step);
+  EXPECT_EQ(step.poses().object_size(), 1);
+}
+
 TEST_F(BulletContactsTest, PosesAreThoseOfTheBodies) {
   contacts_.AddObject(right_, 4);
   contacts_.AddObject(left_, 9);
