@@ -14,7 +14,12 @@ namespace {
 /// After the last force, one knot brings the force down to zero, and another ends the slope.
 constexpr int kKnotsToEnd = 2;
 constexpr double kLongestStep = StepIntervals::kLongestStep;
-constexpr double kLongestBlowS = 0.04;
+/// A blow lasts at most this time or, if they last longer, this number of steps.
+constexpr double kLongestBlowS = 0.1;
+constexpr size_t kMostBlowSteps = LoadTracker::kStepCount;
+/// After this time, the force of a blow that is not over may be that of a contact that slides,
+/// which is heard without waiting for the decision.
+constexpr double kUndecidedS = 0.04;
 /// A force that hardly changes for this time is a load.
 constexpr double kLoadS = 0.01;
 /// Blows that are farther apart than this are heard one by one, not as a tone.
@@ -234,6 +239,7 @@ void BlowGatherer::Divide(Pair& pair) {
   if (pair.blow.begun()) {
     share = force > 0 ? std::max(1 - pair.blow.load_newtons / force, 0.0) : 0;
   }
+  const bool undecided = pair.blow.begun() && *time_s_ - pair.blow.begin_s >= kUndecidedS;
   double remains = 0;
   if (pair.blow.begun() && IsOver(pair.blow, force, share * impulse, remains)) {
     SendBlow(pair, remains);
@@ -244,6 +250,7 @@ void BlowGatherer::Divide(Pair& pair) {
     if (!follows_) SendBlow(pair, 0);
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
+  if (undecided) share = 0;
   for (const PairTouch& touch : pair.touches) {
     for (const Part& part : touch.all()) Add(part, (1 - share) / step_s_, touch.roughness);
   }
@@ -270,7 +277,7 @@ bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse
                           double& remains) const {
   if (impulse <= blow.greatest() / 4) return true;
   remains = force_newtons;
-  if (*time_s_ - blow.begin_s >= kLongestBlowS) return true;
+  if (*time_s_ - blow.begin_s >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps) return true;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
   if (impulse > blow.greatest() / 2 || blow.steps.size() < steps + 1) return false;
   return force_newtons >= 0.75 * blow.steps[blow.steps.size() - steps].force;

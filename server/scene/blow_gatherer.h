@@ -52,9 +52,13 @@ struct ForceEvent {
 ///             |    .     .              * the force above the load has fallen to a quarter of its
 ///             |   .       .               greatest value, or
 ///             |  .         |            * it is below half of that, and steady for 10 ms, or
-///      load   |............|......      * 40 ms have passed.
+///      load   |............|......      * 0.1 s and eight steps have passed.
 ///             +------------+------ t    In the last two cases the force that remains is a load,
 ///             begin        over         and counts for nothing in the blow.
+///
+/// From 40 ms on, the force of such a blow is sent as a force, too, because a body that is put down
+/// and slides must be heard. If the contact does not slide, the force is below the body's modes and
+/// silent.
 ///
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.

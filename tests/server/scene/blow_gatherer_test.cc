@@ -8,7 +8,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -378,6 +380,64 @@ TEST(BlowGatherer, ABodyThatIsPutDownGentlyDoesNotStrike) {
     }
     EXPECT_LT(struck, 1e-3) << rate_hz;  // newton seconds; the first step alone would be 0.004
   }
+}
+
+/// The impulses of 1 N s that an engine reports in equal parts, or as half a sine, in `step_count`
+/// steps. Returns those of the blows.
+std::vector<float> BlowsOfSpread(double rate_hz, int step_count, bool half_sine) {
+  BlowGatherer gatherer(1 / rate_hz);
+  std::vector<double> parts(static_cast<size_t>(step_count), 1);
+  if (half_sine) {
+    for (size_t i = 0; i < parts.size(); ++i) {
+      parts[i] = std::sin(std::numbers::pi * (static_cast<double>(i) + 0.5) / step_count);
+    }
+  }
+  const double whole = std::accumulate(parts.begin(), parts.end(), 0.0);
+  std::vector<float> blows;
+  for (size_t step = 0; step < 2 * parts.size() + 20; ++step) {
+    gatherer.Begin(static_cast<double>(step) / rate_hz);
+    if (step >= 10 && step - 10 < parts.size()) {
+      SurfaceImpulse impulse = kTen;
+      impulse.impulse_newton_seconds[2] = static_cast<float>(parts[step - 10] / whole);
+      gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
+    }
+    for (const ForceEvent& event : gatherer.End()) {
+      if (const auto impulse = Pushed{event}.Impulse()) blows.push_back(*impulse);
+    }
+  }
+  return blows;
+}
+
+TEST(BlowGatherer, AnImpactThatIsSpreadOverEightStepsOrATenthOfASecondLosesNoImpulse) {
+  const std::pair<double, int> spreads[] = {{30, 5},   {30, 8},   {60, 2},    {60, 3},
+                                            {60, 5},   {60, 8},   {120, 12},  {240, 12},
+                                            {240, 23}, {1000, 8}, {1000, 45}, {1000, 99}};
+  for (const auto& [rate_hz, step_count] : spreads) {
+    const std::vector<float> equal = BlowsOfSpread(rate_hz, step_count, false);
+    ASSERT_EQ(equal.size(), 1U) << rate_hz << " Hz, " << step_count;
+    EXPECT_NEAR(equal[0], 1, 1e-5) << rate_hz << " Hz, " << step_count;
+    const std::vector<float> sine = BlowsOfSpread(rate_hz, step_count, true);
+    ASSERT_EQ(sine.size(), 1U) << rate_hz << " Hz, " << step_count;
+    // The end of the sine, below a quarter of its greatest step, is no part of the blow.
+    EXPECT_NEAR(20 * std::log10(sine[0]), 0, 0.4) << rate_hz << " Hz, " << step_count;
+  }
+}
+
+TEST(BlowGatherer, ABodyThatIsPutDownAndSlidesIsHeardAfter40Milliseconds) {
+  BlowGatherer gatherer(0.004);
+  double begin_s = 0;
+  for (int step = 0; step < 60 && begin_s == 0; ++step) {
+    const Roughness roughness{.travel_speed_m_per_s = 1, .depth = 0.3};
+    gatherer.Begin(step * 0.004);
+    if (step >= 10) {
+      gatherer.Touch({.contact = {.handle = 3}, .roughness = roughness}, FeltBy(3, kTen));
+    }
+    for (const ForceEvent& event : gatherer.End()) {
+      const auto* knot = std::get_if<ForceKnot>(&event.action);
+      if (knot != nullptr && knot->bandwidth_hz > 0) begin_s = event.time_s - 10 * 0.004;
+    }
+  }
+  EXPECT_NEAR(begin_s, 0.04, 0.001);
 }
 
 }  // namespace

@@ -122,6 +122,12 @@ void MoveAt(ContactIntake& intake, double time_s) {
   intake.MoveListener({.position_m = {0, time_s, 0}, .orientation = Normalized({1, 0, time_s, 0})});
 }
 
+double EnergyDb(const std::vector<float>& sound) {
+  double sum = 0;
+  for (const float x : sound) sum += double{x} * x;
+  return 10 * std::log10(sum);
+}
+
 std::vector<float> RenderPlaced(const SceneSpace& space, size_t thread_count,
                                 const TimeMapping& mapping, BodyCache& bodies) {
   const auto renderer = *OfflineRenderer::Make({.sample_rate_hz = kRate,
@@ -278,6 +284,25 @@ TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
 TEST_F(OfflineRendererTest, RefusesTwoObjectsOfOneHandle) {
   EXPECT_THAT(Make()->AddObject(1, model_, SmallProperties()).ToString(),
               HasSubstr("OBJECT_EXISTS: "));
+}
+
+TEST_F(OfflineRendererTest, AnImpactInOneStepSoundsAsLoudAsOneThatAnEngineSpreadsOverMoreSteps) {
+  double one_step_db = 0;
+  for (const int step_count : {1, 2, 5, 8}) {
+    const auto renderer = *OfflineRenderer::Make(
+        {.sample_rate_hz = kRate, .tail_s = 0.5, .step_s = 1.0 / 60}, bodies_);
+    ASSERT_TRUE(renderer->AddObject(1, model_, SmallProperties()).ok());
+    for (int step = 0; step < 20; ++step) {
+      ASSERT_TRUE(renderer->intake().BeginStep(step / 60.0).ok());
+      if (step >= 1 && step <= step_count) {
+        renderer->intake().Touch({.contact = SmallImpulse(1, 1.0 / step_count).contact});
+      }
+      renderer->intake().EndStep();
+    }
+    const double energy_db = EnergyDb(RenderAll(*renderer, 8));
+    if (step_count == 1) one_step_db = energy_db;
+    EXPECT_NEAR(energy_db, one_step_db, 0.1) << step_count;
+  }
 }
 
 }  // namespace
