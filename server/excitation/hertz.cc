@@ -16,10 +16,15 @@ double Compliance(double young_pa, double poisson_ratio) {
 
 }  // namespace
 
+double ReducedMassKg(const ElasticBody& struck, const ElasticBody& striker,
+                     const HertzContact& told) {
+  const double striker_mass = told.striker_mass_kg.value_or(striker.mass_kg);
+  return told.reduced_mass_kg.value_or(1 / (1 / struck.mass_kg + 1 / striker_mass));
+}
+
 double HertzDurationS(const ElasticBody& struck, const ElasticBody& striker,
                       const HertzContact& told, double impulse_newton_seconds) {
-  const double striker_mass = told.striker_mass_kg.value_or(striker.mass_kg);
-  const double mass = told.reduced_mass_kg.value_or(1 / (1 / struck.mass_kg + 1 / striker_mass));
+  const double mass = ReducedMassKg(struck, striker, told);
   const double striker_curvature =
       told.striker_radius_m ? 1 / *told.striker_radius_m : striker.curvature_per_m;
   const double curvature =

@@ -34,6 +34,10 @@ inline constexpr ElasticBody kSteelTip{
 /// edge or at a bump.
 inline constexpr double kFlattestRadiusM = 0.05;
 
+/// Returns the reduced mass of the bodies, kg, or the one that is told.
+double ReducedMassKg(const ElasticBody& struck, const ElasticBody& striker,
+                     const HertzContact& told);
+
 /// Returns the time for which the bodies touch, seconds (Johnson, Contact Mechanics, 11.4):
 ///
 ///   T = 2.87 (m^2 / (R E^2 v))^(1/5),  1/E = (1 - nu1^2)/E1 + (1 - nu2^2)/E2

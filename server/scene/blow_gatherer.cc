@@ -108,8 +108,10 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
   PairTouch& added = touches_.emplace_back();
   added.bodies = bodies;
   for (const Felt& felt : impulse.all()) {
-    added.parts[added.part_count++] = {
-        .handle = felt.handle, .serial = felt.serial, .impulse = felt.impulse()};
+    added.parts[added.part_count++] = {.handle = felt.handle,
+                                       .serial = felt.serial,
+                                       .impulse = felt.impulse(),
+                                       .collision = felt.collision};
   }
   added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
   added.roughness = touch.roughness;
@@ -318,6 +320,7 @@ ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which, double
   return {.handle = part.handle,
           .serial = part.serial,
           .action = impulse,
+          .collision = part.collision,
           .by = of_two ? touch.parts[1 - which].handle : touch.bodies.second,
           .by_sounds = of_two};
 }

@@ -35,6 +35,7 @@ struct ForceEvent {
   uint64_t serial = 0;  ///< the serial of the object, see Scene::Insert
   MixerEvent::Action action{};
   double time_s = 0;
+  Collision collision{};   ///< of a blow
   uint32_t by = 0;         ///< the other body of a blow
   bool by_sounds = false;  ///< whether `by`, in a blow, is the handle of an object
 };
@@ -126,6 +127,7 @@ class BlowGatherer {
     uint32_t handle = 0;
     uint64_t serial = 0;
     SurfaceImpulse impulse;
+    Collision collision{};
   };
   struct PairTouch {
     Bodies bodies;

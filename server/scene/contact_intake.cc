@@ -15,6 +15,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/scene/felt_contact.h"
 #include "server/scene/scene_frame.h"
+#include "server/scene/yielding_blow.h"
 #include "server/synthesis/bank/acceleration_noise.h"
 
 namespace carillon {
@@ -254,6 +255,7 @@ void ContactIntake::PushStruck(std::span<StepImpulses::Struck> events) {
     }
     impulse_count_ += event.ReportCount();
     event.bank = (*object)->bank;
+    LetYield(**object, struck.felt.collision, std::get<SurfaceImpulse>(event.action));
     Push(event, struck.frame);
   }
 }
@@ -271,7 +273,8 @@ void ContactIntake::Push(const ForceEvent& force) {
   MixerEvent event{.bank = (*object)->bank, .action = force.action};
   const double frame = FrameOf(force.time_s);
   if (!CheckAhead(frame).ok()) return;  // the end of a force, in a step that was rejected
-  if (event.impulse() != nullptr) {
+  if (auto* impulse = std::get_if<SurfaceImpulse>(&event.action)) {
+    LetYield(**object, force.collision, *impulse);
     ++impulse_count_;
     BlowRecord blow;
     blow.handle = force.handle;

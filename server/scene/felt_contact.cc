@@ -136,10 +136,15 @@ absl::Status Feel(const ObjectContact& contact, PointSource source, const Soundi
     SetDuration(*impulse.duration_s, felt);
     return absl::OkStatus();
   }
+  const ElasticBody struck = ElasticBodyAt(object, located);
+  const Collision collision{
+      .reduced_mass_kg = ReducedMassKg(struck, striker, impulse.hertz),
+      .stated_speed_m_per_s = impulse.hertz.approach_speed_m_per_s.value_or(0)};
+  for (Felt& one : felt.all()) one.collision = collision;
   felt.duration_follows_impulse = !impulse.hertz.approach_speed_m_per_s;
-  SetDuration(HertzDurationS(ElasticBodyAt(object, located), striker, impulse.hertz,
-                             Magnitude(impulse.impulse_newton_seconds)),
-              felt);
+  SetDuration(
+      HertzDurationS(struck, striker, impulse.hertz, Magnitude(impulse.impulse_newton_seconds)),
+      felt);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "absl/status/status.h"
+#include "server/excitation/yielding_contact.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/sounding_object.h"
 #include "server/synthesis/schedule/mixer_event.h"
@@ -25,7 +26,8 @@ struct Felt {
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.
   double largest_newton_seconds = std::numeric_limits<double>::infinity();
-  uint64_t serial = 0;  ///< the object's, on whose surface the point was found
+  uint64_t serial = 0;    ///< the object's, on whose surface the point was found
+  Collision collision{};  ///< the collision that gives the duration, unless it is stated
 
   const SurfaceImpulse& impulse() const { return std::get<SurfaceImpulse>(event.action); }
 };

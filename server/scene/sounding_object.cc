@@ -189,6 +189,7 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
                         .properties = properties,
+                        .sounding = std::make_shared<const SoundingModes>(sounding),
                         .mode_count = static_cast<uint32_t>(sounding.modes.size()),
                         .lowest_frequency_hz = LowestHz(sounding.modes),
                         .highest_frequency_hz = HighestHz(sounding.modes),

@@ -42,7 +42,9 @@ struct ObjectProperties {
 struct SoundingObject {
   std::shared_ptr<const SoundingBody> body;
   ObjectProperties properties;
-  uint32_t mode_count = 0;          ///< number of modes that sound; may be zero, see `clicks`
+  /// The modes that sound; none may, see `clicks`.
+  std::shared_ptr<const SoundingModes> sounding;
+  uint32_t mode_count = 0;          ///< number of modes that sound
   double lowest_frequency_hz = 0;   ///< lowest natural frequency of those modes; zero if none
   double highest_frequency_hz = 0;  ///< highest natural frequency of those modes
   /// Natural frequency up to which the model is complete. Absent if the model is complete up to the

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <numbers>
+
+#include "server/base/octave_gains.h"
 
 namespace carillon {
 namespace {
@@ -26,15 +29,14 @@ void WritePowers(Complex log_q, size_t tile_kind, size_t lane, LaneArrays& lanes
   Set(lanes.step_re, lanes.step_im, lane, std::exp(log_q * static_cast<double>(kTileFrames[0])));
 }
 
-void WriteLane(const PlannedLane& planned, uint32_t first_column, size_t block_frame_count,
-               size_t lane, LaneArrays& lanes) {
+void WriteLane(const PlannedLane& planned, size_t block_frame_count, size_t lane,
+               LaneArrays& lanes) {
   const Complex block = std::exp(planned.log_q * static_cast<double>(block_frame_count));
   lanes.block_re[lane] = block.real();
   lanes.block_im[lane] = block.imag();
   Set(lanes.gain_re, lanes.gain_im, lane, planned.start);
   Set(lanes.lead_re, lanes.lead_im, lane, planned.log_q);
   Set(lanes.contact_re, lanes.contact_im, lane, planned.contact_s);
-  lanes.column[lane] = planned.column - first_column;
 }
 
 }  // namespace
@@ -45,7 +47,8 @@ std::span<const PlannedLane> LanesOf(const LaneRun& run, const LanePlan& plan) {
                          std::min(run.range.count, planned.size() - run.first_in_segment));
 }
 
-LaneArrays MakeLaneArrays(const LanePlan& plan, uint32_t first_column, size_t block_frame_count) {
+LaneArrays MakeLaneArrays(const LanePlan& plan, const Multiplets& multiplets,
+                          size_t block_frame_count) {
   LaneArrays lanes(plan.PaddedCount());
   for (const size_t tile_kind : kTileOrder) {
     for (size_t part = 0; part < plan.lanes.size(); ++part) {
@@ -57,7 +60,10 @@ LaneArrays MakeLaneArrays(const LanePlan& plan, uint32_t first_column, size_t bl
     size_t lane = run.range.first;
     for (const PlannedLane& planned : LanesOf(run, plan)) {
       WritePowers(planned.log_q, run.tile_kind, lane, lanes);
-      WriteLane(planned, first_column, block_frame_count, lane++, lanes);
+      lanes.column[lane] = multiplets.ColumnOf(planned);
+      lanes.octave[lane] = static_cast<uint32_t>(
+          OctaveGains::OctaveOf(planned.contact_s.imag() / (2 * std::numbers::pi)));
+      WriteLane(planned, block_frame_count, lane++, lanes);
     }
   }
   return lanes;
@@ -80,16 +86,21 @@ SpectralLanes MakeSpectralLanes(const std::vector<PlannedLane>& planned, size_t 
 }
 
 /// Samples fewer than 2 * kVertices vertices, evenly spaced by index.
-float MeasureLoudness(const LanePlan& plan, const ShapeTable& shapes) {
+float MeasureLoudness(const LanePlan& plan, const Multiplets& multiplets,
+                      const ShapeTable& shapes) {
   constexpr size_t kVertices = 32;
   const size_t stride = std::max<size_t>(shapes.vertex_count() / kVertices, 1);
+  std::vector<float> modal(multiplets.column_count());
   double sum = 0;
   size_t count = 0;
   for (size_t vertex = 0; vertex < shapes.vertex_count(); vertex += stride) {
     for (size_t axis = 0; axis < 3; ++axis, ++count) {
+      const int16_t* const row = shapes.Row(vertex, axis) + multiplets.first_column();
+      std::copy_n(row, multiplets.projected_count(), modal.begin());
+      multiplets.Combine(modal.data());
       for (const auto& planned : plan.lanes) {
         for (const PlannedLane& lane : planned) {
-          const double shape = shapes.Row(vertex, axis)[lane.column];
+          const double shape = modal[multiplets.ColumnOf(lane)];
           if (!lane.companion) sum += std::norm(lane.start) * shape * shape;
         }
       }

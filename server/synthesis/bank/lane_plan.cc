@@ -22,6 +22,8 @@ PlannedLane PlanLane(const SoundingMode& mode, const LanePlanSettings& settings,
                      bool companion) {
   const double sigma = mode.decay_rate_per_s - (companion ? mode.damped_rad_per_s : 0);
   return {.column = mode.column,
+          .multiplet = mode.multiplet,
+          .mode_count = companion ? 0U : 1U,
           .log_q = Complex(sigma, mode.damped_rad_per_s) / settings.sample_rate_hz,
           .start = std::polar((companion ? -gain : gain) * mode.coupling / mode.damped_rad_per_s,
                               mode.output_phase_rad) *
@@ -87,12 +89,21 @@ LaneRange LanePlan::Tiled(size_t part, size_t tile_kind) const {
 LanePlan PlanLanes(const SoundingModes& sounding, const ShapeTable& shapes,
                    const LanePlanSettings& settings) {
   LanePlan plan;
-  for (const SoundingMode& mode : sounding.modes) {
-    const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain *
-                        double{shapes.scale(mode.column)};
-    Place(PlanLane(mode, settings, gain, false), settings.block_frame_count, plan);
+  for (auto next = sounding.modes.begin(); next != sounding.modes.end();) {
+    const SoundingMode& mode = *next++;
+    const double gain = sounding.shape_scale * kSamplesPerVolumeVelocity * settings.gain;
+    if (mode.multiplet != 0) {
+      PlannedLane lane = PlanLane(mode, settings, gain, false);
+      for (; next != sounding.modes.end() && next->multiplet == mode.multiplet; ++next) {
+        ++lane.mode_count;
+      }
+      Place(lane, settings.block_frame_count, plan);
+      continue;
+    }
+    const double scaled = gain * double{shapes.scale(mode.column)};
+    Place(PlanLane(mode, settings, scaled, false), settings.block_frame_count, plan);
     if (mode.output_phase_rad == 0 && !settings.directed) continue;
-    Place(PlanLane(mode, settings, gain, true), settings.block_frame_count, plan);
+    Place(PlanLane(mode, settings, scaled, true), settings.block_frame_count, plan);
   }
   FillVectors(settings.block_frame_count, plan);
   std::ranges::stable_sort(plan.lanes[0], std::ranges::greater(),

@@ -15,11 +15,14 @@
 
 namespace carillon {
 
-/// One lane of a bank: a mode or the companion of one.
+/// One lane of a bank: a mode, a multiplet or the companion of a mode.
 struct PlannedLane {
   uint32_t column = 0;
+  uint32_t multiplet = 0;      ///< see SoundingMode; `column` is then that of its first mode
+  uint32_t mode_count = 1;     ///< number of modes that sound by the lane; zero for a companion
   std::complex<double> log_q;  ///< (sigma + i omega)/rate
-  std::complex<double> start;  ///< the state after a modal impulse of one unit of the shape table
+  /// The state after a modal impulse of one unit of the shape table or, for a multiplet, of one.
+  std::complex<double> start;
   std::complex<double> contact_s;  ///< sigma + i omega, 1/s, for the factor of a contact
   SpreadMode spread;               ///< how the lane spreads in the long blocks of its part
   bool companion = false;

@@ -52,15 +52,6 @@ strike_kernel::Onset OnsetOf(float lead_frames, Pulse pulse) {
           .cosine_duration_s = pulse.gaussian() ? 0 : pulse.duration_s()};
 }
 
-uint32_t FirstColumn(const SoundingModes& sounding) {
-  return sounding.modes.empty() ? 0 : sounding.modes.front().column;
-}
-
-size_t CountColumns(const SoundingModes& sounding) {
-  return sounding.modes.empty() ? 0
-                                : sounding.modes.back().column - FirstColumn(sounding) + size_t{1};
-}
-
 }  // namespace
 
 OscillatorBank::OscillatorBank(const SoundingModes& sounding, const ShapeTable& shapes,
@@ -79,15 +70,14 @@ OscillatorBank::OscillatorBank(const LanePlan& plan, const SoundingModes& soundi
       silence_squared_(settings.silence * settings.silence),
       mode_count_(sounding.modes.size()),
       lane_count_(plan.PaddedCount()),
-      first_column_(FirstColumn(sounding)),
-      column_count_(CountColumns(sounding)),
-      loudness_per_newton_second_(MeasureLoudness(plan, shapes_)),
-      force_(lane_count_, column_count_, settings.sample_rate_hz, settings.noise_seed),
-      lanes_(MakeLaneArrays(plan, first_column_, block_frame_count_)) {
+      multiplets_(sounding, shapes_),
+      loudness_per_newton_second_(MeasureLoudness(plan, multiplets_, shapes_)),
+      force_(lane_count_, multiplets_.column_count(), settings.sample_rate_hz, settings.noise_seed),
+      lanes_(MakeLaneArrays(plan, multiplets_, block_frame_count_)) {
   assert(block_frame_count_ > 0 && block_frame_count_ <= kMostBlockFrames);
-  assert(first_column_ + column_count_ <= shapes_.mode_count());
+  assert(multiplets_.first_column() + multiplets_.projected_count() <= shapes_.mode_count());
   assert(lane_count_ <= StrikeBatch::kMostBankLanes);
-  assert(column_count_ <= StrikeBatch::kMostBankLanes);
+  assert(multiplets_.column_count() <= StrikeBatch::kMostBankLanes);
   SetSegments(plan);
   const double lowest_rad_per_s =
       sounding.modes.empty() ? 1 : sounding.modes.front().damped_rad_per_s;
@@ -135,7 +125,7 @@ void OscillatorBank::SetSegments(const LanePlan& plan) {
     const size_t first_group = group_mode_counts_.size();
     group_mode_counts_.resize(first_group + plan.PaddedCount(part) / kMostLanes);
     for (size_t i = 0; i < planned.size(); ++i) {
-      if (!planned[i].companion) ++group_mode_counts_[first_group + i / kMostLanes];
+      group_mode_counts_[first_group + i / kMostLanes] += planned[i].mode_count;
     }
     if (part == 0) continue;
     long_segments_.push_back(
@@ -336,7 +326,7 @@ void OscillatorBank::CountAwake() noexcept {
 
 std::optional<strike_kernel::Projection> OscillatorBank::Project(
     const TrianglePoint& at, const std::array<float, 3>& vector) const noexcept {
-  strike_kernel::Projection projection{.column_count = column_count_};
+  strike_kernel::Projection projection{.column_count = multiplets_.projected_count()};
   for (size_t i = 0; i < 3; ++i) {
     if (at.vertices[i] >= shapes_.vertex_count()) return std::nullopt;
     AddVertex(at.vertices[i], at.weights[i], vector, projection);
@@ -347,7 +337,7 @@ std::optional<strike_kernel::Projection> OscillatorBank::Project(
 void OscillatorBank::AddVertex(size_t vertex, float weight, const std::array<float, 3>& vector,
                                strike_kernel::Projection& projection) const noexcept {
   for (size_t axis = 0; axis < 3; ++axis) {
-    projection.rows[projection.row_count] = shapes_.Row(vertex, axis) + first_column_;
+    projection.rows[projection.row_count] = shapes_.Row(vertex, axis) + multiplets_.first_column();
     projection.factors[projection.row_count++] = weight * vector[axis];
   }
 }
@@ -371,9 +361,10 @@ StrikeBatch::RowsAhead OscillatorBank::RowsOf(std::span<const DueEvent> events) 
 bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mix) noexcept {
   if (mode_count_ == 0) return true;
   float* modal_impulses = mix.batch().modal_impulses();
-  strike_kernel::Projection projection{.column_count = column_count_};
+  strike_kernel::Projection projection{.column_count = multiplets_.projected_count()};
   double weight_sum = 0, time_sum = 0, variance_sum = 0, most_weight = 0;
   Pulse shape;
+  OctaveGains gains;
   for (const DueEvent& due : events) {
     const SurfaceImpulse* impulse = due.event->impulse();
     assert(impulse != nullptr);
@@ -383,7 +374,10 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
     weight_sum += weight;
     time_sum += weight * (due.offset - double{due.event->LeadFrames()});
     variance_sum += weight * impulse->pulse.variance_s2();
-    if (weight > most_weight) shape = impulse->pulse;
+    if (weight > most_weight) {
+      shape = impulse->pulse;
+      gains = impulse->gains;
+    }
     most_weight = std::max(most_weight, weight);
     AddVertex(nearest, 1, impulse->impulse_newton_seconds, projection);
     if (projection.row_count < projection.rows.size()) continue;
@@ -397,8 +391,7 @@ bool OscillatorBank::StrikeMerged(std::span<const DueEvent> events, BlockMix& mi
   const double offset = std::max(std::ceil(time), 0.0);
   const Pulse pulse = Pulse::OfVariance(static_cast<float>(variance_sum / weight_sum), shape);
   const auto lead_frames = static_cast<float>(offset - time);
-  return StrikeModes({modal_impulses, column_count_}, static_cast<size_t>(offset),
-                     OnsetOf(lead_frames, pulse), mix);
+  return StrikeModes(static_cast<size_t>(offset), OnsetOf(lead_frames, pulse), gains, mix);
 }
 
 bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
@@ -407,10 +400,8 @@ bool OscillatorBank::Strike(const SurfaceImpulse& impulse, size_t offset, float 
   const std::optional<strike_kernel::Projection> projection =
       Project(impulse.at, impulse.impulse_newton_seconds);
   if (!projection) return false;
-  float* modal_impulses = mix.batch().modal_impulses();
-  strike_kernel::Project(*projection, modal_impulses);
-  return StrikeModes({modal_impulses, column_count_}, offset, OnsetOf(lead_frames, impulse.pulse),
-                     mix);
+  strike_kernel::Project(*projection, mix.batch().modal_impulses());
+  return StrikeModes(offset, OnsetOf(lead_frames, impulse.pulse), impulse.gains, mix);
 }
 
 double OscillatorBank::ContactLeadFrames(Pulse pulse) const noexcept {
@@ -425,9 +416,17 @@ bool OscillatorBank::BeginContact(const SurfaceImpulse& impulse, size_t offset,
   return true;
 }
 
-bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t offset,
-                                 strike_kernel::Onset onset, BlockMix& mix) noexcept {
-  assert(modal_impulses.size() == column_count_);
+/// Applies the projected impulses in the batch. The caller leaves onset.frames_into_tiles at zero.
+bool OscillatorBank::StrikeModes(size_t offset, strike_kernel::Onset onset,
+                                 const OctaveGains& gains, BlockMix& mix) noexcept {
+  std::array<float, OctaveGains::kCount> factors{};
+  if (!gains.none()) {
+    for (size_t octave = 0; octave < factors.size(); ++octave) {
+      factors[octave] = gains.Factor(octave);
+    }
+    onset.octave_factors = factors.data();
+  }
+  multiplets_.Combine(mix.batch().modal_impulses());
   BeginStrikes(mix);
   StrikeBatch& batch = mix.batch();
   const size_t asked = std::exchange(offset, NotBeforeTheLast(offset, batch));
@@ -437,7 +436,7 @@ bool OscillatorBank::StrikeModes(std::span<const float> modal_impulses, size_t o
     onset.frames_into_tiles = offset - block_.rendered_to;
   }
   const bool finite =
-      strike_kernel::Excite(lanes_, lane_count_, modal_impulses.data(), onset, batch.ahead,
+      strike_kernel::Excite(lanes_, lane_count_, batch.modal_impulses(), onset, batch.ahead,
                             batch.re(batch.count, lane_count_), batch.im(batch.count, lane_count_));
   if (finite) NoteOnset(offset, batch);
   if (modes_silent()) block_.phase = Phase::kWaiting;  // silent modes are not rendered
@@ -459,6 +458,7 @@ bool OscillatorBank::ApplyKnot(const ForceKnot& knot, size_t offset, BlockMix& m
   const bool silent_before = modes_silent();
   offset = NotBeforeTheLast(offset, batch);
   RenderStrikes(offset, mix);
+  multiplets_.Combine(force_.next());
   const bool finite =
       force_.ApplyKnot(knot, lanes_, batch.re(0, lane_count_), batch.im(0, lane_count_));
   if (finite) {

@@ -17,6 +17,7 @@
 #include "server/synthesis/bank/directed_gains.h"
 #include "server/synthesis/bank/level.h"
 #include "server/synthesis/bank/long_segment.h"
+#include "server/synthesis/bank/multiplets.h"
 #include "server/synthesis/bank/shape_table.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/bank/sustained_force.h"
@@ -73,7 +74,7 @@ struct OscillatorBankSettings {
 /// a soft mallet. Therefore it has a companion of the same frequency and opposite sign that decays
 /// by exp(-1) in a radian. Their sum, cos(omega t) (exp(sigma t) - exp((sigma - omega) t)), begins
 /// at zero with the slope of the pair's first mode. In a bank with directivity each mode has such a
-/// companion.
+/// companion. Three or more degenerate modes ring as one (Multiplets).
 ///
 /// A bank may have no modes. Then only the acceleration of its body sounds.
 ///
@@ -92,12 +93,6 @@ class OscillatorBank {
   /// that the body lacks.
   bool Strike(const SurfaceImpulse& impulse, size_t offset, float lead_frames,
               BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
-
-  /// Applies modal impulses g_m, in units of the shape table's scales, one for each of the
-  /// column_count() projected columns. The caller leaves onset.frames_into_tiles at zero. Returns
-  /// false if an impulse is not finite.
-  bool StrikeModes(std::span<const float> modal_impulses, size_t offset, strike_kernel::Onset onset,
-                   BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
 
   /// Applies the impulses of `events`, which are neighbours in time within this block, as one
   /// onset, which costs less. Each acts at the nearest vertex of its triangle, and all act at their
@@ -185,10 +180,6 @@ class OscillatorBank {
   /// forces are kept, so that a resting load makes no new sound.
   void Hush() noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole) { SilenceLanes(); }
 
-  /// Number of columns of the shape table onto which impulses are projected, from the column of the
-  /// first mode on.
-  size_t column_count() const noexcept { return column_count_; }
-
   /// Number of modes of the object.
   size_t mode_count() const noexcept { return mode_count_; }
 
@@ -246,6 +237,8 @@ class OscillatorBank {
   size_t NotBeforeTheLast(size_t offset, const StrikeBatch& batch) const noexcept;
   void NoteOnset(size_t offset, StrikeBatch& batch) noexcept;
   void BeginStrikes(BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
+  bool StrikeModes(size_t offset, strike_kernel::Onset onset, const OctaveGains& gains,
+                   BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderStrikes(size_t end, BlockMix& mix) noexcept ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
   void RenderDrivenStrikes(size_t end, BlockMix& mix) noexcept
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(kRenderRole);
@@ -275,13 +268,12 @@ class OscillatorBank {
   double silence_squared_;
   size_t mode_count_;
   size_t lane_count_;  // modes and companions, each kind padded to whole vectors
-  uint32_t first_column_;
-  size_t column_count_;
+  Multiplets multiplets_;
   std::array<RingingSegment, kMostSegments> segments_;  // the first for the time domain only
   Counts counted_{};                        // awake lanes of each segment at the last CountAwake
   std::vector<LongSegment> long_segments_;  // kLongBlockKinds of them
-  // Modes, without companions, in each group of kMostLanes lanes, by segment.
-  std::vector<uint8_t> group_mode_counts_;
+  // Modes in each group of kMostLanes lanes, by segment.
+  std::vector<uint32_t> group_mode_counts_;
   // A block without events in which the bank rings by spectrum reads only the members from here to
   // the start of force_, so that a thousand banks cost few cache misses.
   Block block_;

@@ -17,12 +17,12 @@ struct SoundingBand {
   double shortest_t60_s = 0.002;
   /// If more modes qualify, the most audible are kept; see SelectSoundingModes.
   size_t most_modes = 800;
-  /// Two neighbours form a degenerate pair if their natural frequencies differ relatively by no
-  /// more than this and their couplings by less than a factor of two. Finite-element meshes split
-  /// true pairs by up to about 1e-3.
+  /// Modes are joined as degenerate (JoinDegenerateModes) if their natural frequencies differ
+  /// relatively by no more than this and their couplings by less than a factor of two.
+  /// Finite-element meshes split true pairs by up to about 1e-3.
   double pair_tolerance = 2e-3;
-  /// If true, the modes of a degenerate pair radiate in different directions, so each keeps its
-  /// coupling and phase; the two share only their mean frequency and decay.
+  /// If true, degenerate modes radiate in different directions, so each keeps its coupling and
+  /// phase; they share only their mean frequency and decay.
   bool directed = false;
 };
 
@@ -39,6 +39,9 @@ struct SoundingMode {
   /// The phase by which the output leads a sine: pi/2 for the second mode of a degenerate pair,
   /// else zero.
   double output_phase_rad = 0;
+  /// The number, from 1, of the multiplet of three or more degenerate modes to which the mode
+  /// belongs; zero if it belongs to none. Such modes sound as one (Multiplets).
+  uint32_t multiplet = 0;
 };
 
 /// The modes with which a body sounds.
@@ -64,12 +67,12 @@ double NaturalFrequencyHz(double eigenvalue, const SoundingMaterial& material);
 ///
 /// so that the mode loses the power W that it radiates, and the pressure at 1 m is that of W
 /// radiated equally in all directions. A mode sounds if its natural frequency lies in the band and
-/// below Nyquist, sigma^2 < Lambda', and T60 is long enough. The two modes of a degenerate pair
-/// share their mean frequency, decay and coupling and differ in phase by a quarter period, so that
-/// loudness does not depend on the direction around the body in which it is struck. The mesh splits
-/// the pair of a chime by about 1e-4; unmerged, the pair would beat over seconds and differ by 2
-/// dB. If more than `most_modes` qualify, the modes with the most A-weighted energy in the first
-/// 0.2 s after a unit modal impulse are kept (0.2 s is about the ear's integration time).
+/// below Nyquist, sigma^2 < Lambda', and T60 is long enough. Degenerate modes are joined
+/// (JoinDegenerateModes), so that loudness does not depend on the direction around a symmetric body
+/// in which it is struck. The mesh splits the pair of a chime by about 1e-4; unmerged, the pair
+/// would beat over seconds and differ by 2 dB. If more than `most_modes` qualify, the modes with
+/// the most A-weighted energy in the first 0.2 s after a unit modal impulse are kept (0.2 s is
+/// about the ear's integration time).
 SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial& material,
                                   double sample_rate_hz, const SoundingBand& band = {});
 

@@ -45,6 +45,9 @@ class SustainedForce {
     force_kernel::AddForce(projection, arrays_.next.data());
   }
 
+  /// The whole force of the next knot so far, by columns of modal impulses.
+  float* next() noexcept { return arrays_.next.data(); }
+
   /// Ends a step, and writes the knot's contribution to the states into added_re and added_im.
   /// Returns false if the force was not finite; it is then zero, and nothing is written.
   bool ApplyKnot(const ForceKnot& knot, const LaneArrays& lanes, float* added_re,

@@ -25,7 +25,8 @@ LaneArrays::LaneArrays(size_t lane_count)
       lead_im(lane_count),
       contact_re(lane_count),
       contact_im(lane_count),
-      column(lane_count) {}
+      column(lane_count),
+      octave(lane_count) {}
 
 void LaneArrays::Add(size_t lane_count, size_t tile_kind, size_t segment, size_t first_in_segment) {
   const size_t first = runs.empty() ? 0 : runs.back().range.first + runs.back().range.count;

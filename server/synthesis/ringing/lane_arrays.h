@@ -112,6 +112,8 @@ struct LaneArrays {
   LaneArray<float> contact_re, contact_im;
   /// The mode's column among the projected columns.
   LaneArray<uint32_t> column;
+  /// The octave of the mode's damped frequency (OctaveGains).
+  LaneArray<uint32_t> octave;
 };
 
 }  // namespace carillon

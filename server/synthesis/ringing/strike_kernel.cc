@@ -115,10 +115,11 @@ enum class Reach {
 
 /// The distance from an impulse to the frame at which states are computed.
 struct Way {
-  V lead_frames;       ///< negative: that frame lies before the impulse
-  V tau_squared;       ///< of a Gaussian; zero: another pulse
-  V half_duration;     ///< of a raised cosine
-  size_t share_ahead;  ///< values of each row ahead to prefetch for each vector
+  V lead_frames;                ///< negative: that frame lies before the impulse
+  V tau_squared;                ///< of a Gaussian; zero: another pulse
+  V half_duration;              ///< of a raised cosine
+  size_t share_ahead;           ///< values of each row ahead to prefetch for each vector
+  const float* octave_factors;  ///< null: all are one
 };
 
 /// (re, im) *= exp(lead_frames log q + tau^2 s^2/2).
@@ -182,7 +183,12 @@ void ExciteLanes(const LaneArrays& lanes, LaneRange range, const float* modal_im
     PrefetchRows(ahead, lane / hn::Lanes(d) * way.share_ahead, way.share_ahead);
     const auto column =
         hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Floats>(), lanes.column.data() + lane));
-    const V g = hn::GatherIndex(d, modal_impulses, column);
+    V g = hn::GatherIndex(d, modal_impulses, column);
+    if (HWY_UNLIKELY(way.octave_factors != nullptr)) {
+      const auto octave =
+          hn::BitCast(di, hn::Load(hn::RebindToUnsigned<Floats>(), lanes.octave.data() + lane));
+      g = hn::Mul(g, hn::GatherIndex(d, way.octave_factors, octave));
+    }
     V re = hn::Mul(g, hn::Load(d, lanes.gain_re.data() + lane));
     V im = hn::Mul(g, hn::Load(d, lanes.gain_im.data() + lane));
     if constexpr (kCosine) SpreadOverCosine(lanes, lane, way.half_duration, re, im);
@@ -213,7 +219,7 @@ bool Excite(const LaneArrays& lanes, size_t lane_count, const float* modal_impul
     const size_t back = tile_kind == 0 ? 0 : onset.frames_into_tiles % kTileFrames[tile_kind];
     const float lead_frames = onset.lead_frames - static_cast<float>(back);
     const Way way{hn::Set(d, lead_frames), hn::Set(d, tau_s * tau_s), hn::Set(d, duration_s / 2),
-                  share};
+                  share, onset.octave_factors};
     const auto excite = duration_s > 0 ? ChooseExcite<true>(anywhere, back, lead_frames)
                                        : ChooseExcite<false>(anywhere, back, lead_frames);
     excite(lanes, lanes.by_tile[tile_kind], modal_impulses, way, ahead, sum, added_re, added_im);

@@ -32,6 +32,8 @@ struct Onset {
   float lead_frames = 0;        ///< from the impulse to its first audible sample
   float gaussian_tau_s = 0;     ///< standard deviation of a Gaussian pulse; zero for another pulse
   float cosine_duration_s = 0;  ///< duration of a raised cosine; zero for another pulse
+  /// The factor of each octave (OctaveGains), or null if all are one.
+  const float* octave_factors = nullptr;
   /// Number of frames from the start of the part's first tile (tile.h) to the onset. If it is zero,
   /// the states of lanes in longer tiles, too, are computed at the onset's frame.
   size_t frames_into_tiles = 0;

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <variant>
 
+#include "server/base/octave_gains.h"
 #include "server/synthesis/schedule/pulse.h"
 
 namespace carillon {
@@ -30,6 +31,7 @@ struct SurfaceImpulse {
   TrianglePoint at{};
   std::array<float, 3> impulse_newton_seconds{};  ///< in the object's frame
   Pulse pulse{};
+  OctaveGains gains{};  ///< of the modes by their damped frequencies
 };
 
 /// The start of an impulse's contact. The sound of the body's own acceleration begins at this time,
@@ -118,6 +120,6 @@ struct MixerEvent {
 
 // Queues between threads copy events bytewise.
 static_assert(std::is_trivially_copyable_v<MixerEvent>);
-static_assert(sizeof(MixerEvent) == 72);
+static_assert(sizeof(MixerEvent) == 80);
 
 }  // namespace carillon

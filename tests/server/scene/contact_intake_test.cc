@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -300,6 +301,37 @@ TEST_F(ReadingTest, AContactWithoutADurationIsElasticAndHasTheStreamsPulse) {
   cosine.EndStep();
   EXPECT_GT(Newest().pulse.duration_s(), 2 * hard.duration_s());
   EXPECT_EQ(Newest().pulse, Newest(1).pulse);
+}
+
+TEST_F(ReadingTest, TheModesOfAThinBodyYieldToABlowWithoutADuration) {
+  auto thin = std::make_shared<ModalModel>(*SmallModel());
+  thin->digest = std::string(64, 'b');
+  for (float& shape : thin->shapes) shape *= 77;  // as if each mode moved the whole body alike
+  const auto placed = scenes_.AddObject(registered_, 3, thin, SmallProperties());
+  ASSERT_TRUE(scene_.Insert(3, placed->object).ok());
+  ContactIntake cosine = Open({}), gaussian = Open({.gaussian_pulses = true});
+  ObjectImpulse impulse = SmallImpulse(3, 0.02);
+  const auto newest_gains = [&] {
+    return std::ranges::find_if(target_.events.rbegin(), target_.events.rend(),
+                                [](const MixerEvent& event) { return event.impulse() != nullptr; })
+        ->impulse()
+        ->gains;
+  };
+  const auto gains_of = [&](ContactIntake& intake) {
+    intake.Strike(impulse);
+    intake.EndStep();
+    return newest_gains();
+  };
+  EXPECT_TRUE(gains_of(cosine).none());  // the duration is stated
+  impulse.contact.impulse.duration_s = std::nullopt;
+  EXPECT_TRUE(gains_of(gaussian).none());
+  const OctaveGains gains = gains_of(cosine);
+  EXPECT_LT(gains.Factor(OctaveGains::OctaveOf(kTestFrequenciesHz[0])), 1);
+  cosine.Touch({.contact = impulse.contact});
+  cosine.EndStep();
+  EXPECT_EQ(newest_gains(), gains);
+  impulse.contact.handle = 1;  // whose modes hardly move it
+  EXPECT_TRUE(gains_of(cosine).none());
 }
 
 TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {

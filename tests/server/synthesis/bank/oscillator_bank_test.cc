@@ -7,6 +7,9 @@
 #include <complex>
 #include <limits>
 #include <numbers>
+#include <numeric>
+#include <random>
+#include <span>
 #include <vector>
 
 #include "tests/server/synthesis/closed_form.h"
@@ -131,6 +134,78 @@ TEST(OscillatorBank, LoudnessOfADegeneratePairDoesNotDependOnTheAngle) {
   EXPECT_LT(20 * std::log10(most / least), 0.5);
 }
 
+/// A multiplet of `mode_count` modes at one frequency and one single mode. Along x, the modes of
+/// the multiplet move each vertex by a vector of unit length, in random directions of the
+/// multiplet.
+struct Multiplet {
+  explicit Multiplet(uint32_t mode_count) {
+    std::mt19937 random(mode_count);
+    std::normal_distribution<double> normal;
+    const size_t columns = mode_count + 1;
+    std::vector<float> values(kVertices * 3 * columns);
+    for (size_t vertex = 0; vertex < kVertices; ++vertex) {
+      std::vector<double> row(mode_count);
+      for (double& value : row) value = normal(random);
+      const double norm = std::sqrt(std::inner_product(row.begin(), row.end(), row.begin(), 0.0));
+      for (size_t m = 0; m < mode_count; ++m) {
+        values[3 * vertex * columns + m] = static_cast<float>(row[m] / norm);
+      }
+    }
+    shapes = ShapeTable(values, kVertices, columns);
+    for (uint32_t m = 0; m < mode_count; ++m) {
+      sounding.modes.push_back(MakeMode(m, 587.33, -5, 440));
+      sounding.modes.back().multiplet = 1;
+    }
+    sounding.modes.push_back(MakeMode(mode_count, 1000, -5, 440));
+  }
+
+  static SurfaceImpulse At(uint32_t vertex, float newton_seconds = 1) {
+    return {.at = {.vertices = {vertex, vertex, vertex}, .weights = {1, 0, 0}},
+            .impulse_newton_seconds = {newton_seconds, 0, 0}};
+  }
+
+  static constexpr uint32_t kVertices = 14;
+  ShapeTable shapes;
+  SoundingModes sounding{};
+};
+
+TEST(OscillatorBank, AMultipletSoundsAsLoudAsAModeOfItsPowerWhereverItIsStruck) {
+  OscillatorBank single({.modes = {MakeMode(0, 587.33, -5, 440)}}, MakeUniformShapes(1), {});
+  const double right = Rms(Ring(single, MakeUnitImpulse(), 24000));
+  for (const uint32_t mode_count : {3U, 5U, 7U}) {
+    const Multiplet multiplet(mode_count);
+    for (uint32_t vertex = 0; vertex < Multiplet::kVertices; ++vertex) {
+      OscillatorBank bank(multiplet.sounding, multiplet.shapes, {});
+      EXPECT_NEAR(Rms(Ring(bank, Multiplet::At(vertex), 24000)) / right, 1, 1e-3) << vertex;
+      EXPECT_EQ(bank.mode_count(), mode_count + 1);
+      EXPECT_EQ(bank.active_mode_count(), mode_count + 1);
+    }
+  }
+}
+
+TEST(OscillatorBank, ARoughForceDrivesAMultipletEquallyWhereverItActs) {
+  const auto slide = [](uint32_t mode_count, uint32_t vertex) {
+    const Multiplet multiplet(mode_count);
+    OscillatorBank bank(multiplet.sounding, multiplet.shapes, {});
+    TestMix test;
+    std::vector<float> sound(24064);
+    for (size_t start = 0; start < sound.size(); start += 128) {
+      BlockMix& mix = test.Begin();
+      bank.AddForce({.at = {.vertices = {vertex, vertex, vertex}, .weights = {1, 0, 0}},
+                     .force_newtons = {1, 0, 0}});
+      bank.ApplyKnot({.step_s = 128 / 48000.0F, .roughness = 0.3F, .bandwidth_hz = 4000}, 0, mix);
+      test.Render(bank, std::span(sound).subspan(start, 128));
+    }
+    return Rms(sound);
+  };
+  const double right = slide(3, 0);
+  EXPECT_GT(right, 0);
+  for (const uint32_t vertex : {1U, 2U, 3U}) {
+    EXPECT_NEAR(slide(3, vertex) / right, 1, 1e-3);
+    EXPECT_NEAR(slide(7, vertex) / right, 1, 1e-3);
+  }
+}
+
 TEST(OscillatorBank, TheCosineOfADegeneratePairBeginsWithoutAClick) {
   // The largest second difference of a sine of amplitude A and step w = omega dt is A w^2, and A w
   // at its onset, where the slope begins. A bare cosine would begin with A, 13 times as much.
@@ -144,6 +219,21 @@ TEST(OscillatorBank, TheCosineOfADegeneratePairBeginsWithoutAClick) {
     }
     EXPECT_LT(roughest, 1.5 * amplitude * step);
   }
+}
+
+TEST(OscillatorBank, EachOctaveOfABlowHasItsGain) {
+  const SoundingModes sounding{.modes = {MakeMode(0, 440, -5), MakeMode(1, 3000, -20)}};
+  SurfaceImpulse impulse = MakeUnitImpulse();
+  impulse.gains.SetDb(OctaveGains::OctaveOf(440), -20);
+  impulse.gains.SetDb(OctaveGains::OctaveOf(3000), 6);
+  OscillatorBank bank(sounding, MakeUniformShapes(2), {});
+  const std::vector<float> sound = Ring(bank, impulse, 24000);
+  const auto right = [&](size_t n) {
+    const double time_s = static_cast<double>(n) * kDt;
+    return 0.1 * ClosedForm(sounding.modes[0], 1, time_s) +
+           std::pow(10, 0.3) * ClosedForm(sounding.modes[1], 1, time_s);
+  };
+  EXPECT_LT(DeviationDb(sound, 0, 1, right), -80);
 }
 
 TEST(OscillatorBank, FallsSilentAndThenAddsNothing) {
