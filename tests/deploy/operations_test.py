@@ -50,6 +50,12 @@ class MetricsTest(unittest.TestCase):
         named = set(METRIC.findall(expressions))
         self.assertGreater(len(named), 15)
         self.assertEqual(named - metrics_of_daemon(), set())
+        daemon = (ROOT / "server/daemon/daemon_metrics.cc").read_text()
+        for label, values in re.findall(r'(\w+)=~?"([a-z_|]+)"', expressions):
+            if label != "job":  # Prometheus adds that
+                self.assertIn(f'.label_name = "{label}"', daemon)
+                for value in values.split("|"):
+                    self.assertIn(f'Of("{value}"', daemon)
 
     def test_the_page_for_operators_lists_every_metric(self):
         page = (ROOT / "docs/run.md").read_text()
