@@ -3,7 +3,7 @@
 """Carillon's decomposition beside the programs that others use, on the same input, in turn.
 
 Each part prints a Markdown table:
-  compare   SciPy, SLEPc and Spectra on the same matrices: CPU seconds, residuals
+  compare   SLEPc and Spectra on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
   curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
@@ -52,8 +52,7 @@ def fair_environment():
     return environment
 
 
-PARTS = {"compare": compare.compare,
-         "calculix": calculix.compare_frequencies,
+PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
          "curved": curved.curved,
          "growth": growth.growth,
          "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}

@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What people write with Spectra: shift-invert Lanczos with a factorization of their choice.
+// What people write with Spectra: shift-invert Lanczos with a factorization of Eigen's.
 //
-//     spectra_peer eigen|cholmod|default FOLDER COUNT SHIFT TOLERANCE
+//     spectra_peer FOLDER COUNT SHIFT TOLERANCE
 //
 // reads the matrices of FOLDER and finds the COUNT eigenvalues next above SHIFT, which is below
 // all.
 
 #include <Spectra/MatOp/SparseSymMatProd.h>
-#include <Spectra/MatOp/SymShiftInvert.h>
 #include <Spectra/SymGEigsShiftSolver.h>
 
-#include <Eigen/CholmodSupport>
 #include <Eigen/SparseCholesky>
 #include <cstdlib>
 #include <exception>
 #include <string>
-#include <string_view>
 
 #include "tests/benchmarks/decomposition/matrix_file.h"
 
@@ -26,8 +23,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 using MassProduct = Spectra::SparseSymMatProd<double, Eigen::Lower>;
 
-/// y = (K - sigma M)^-1 x by a factorization of Eigen's interface.
-template <typename Factorization>
+/// y = (K - sigma M)^-1 x by a factorization of Eigen's.
 class FactorizedInverse {
  public:
   using Scalar = double;
@@ -45,7 +41,7 @@ class FactorizedInverse {
  private:
   const Sparse& K_;
   const Sparse& M_;
-  Factorization factorization_;
+  Eigen::SimplicialLDLT<Sparse> factorization_;
 };
 
 struct Task {
@@ -55,15 +51,14 @@ struct Task {
   double tolerance;
 };
 
-template <typename Inverse>
 int Solve(const Task& task) {
   const Sparse K = ReadSparse(task.folder + "/K");
   const Sparse M = ReadSparse(task.folder + "/M");
   const Stopwatch watch;
-  Inverse inverse(K, M);
+  FactorizedInverse inverse(K, M);
   MassProduct mass(M);
-  Spectra::SymGEigsShiftSolver<Inverse, MassProduct, Spectra::GEigsMode::ShiftInvert> solver(
-      inverse, mass, task.count, 2 * task.count + 20, task.shift);
+  Spectra::SymGEigsShiftSolver<FactorizedInverse, MassProduct, Spectra::GEigsMode::ShiftInvert>
+      solver(inverse, mass, task.count, 2 * task.count + 20, task.shift);
   solver.init();
   solver.compute(Spectra::SortRule::LargestMagn, 1000, task.tolerance,
                  Spectra::SortRule::SmallestAlge);
@@ -74,30 +69,18 @@ int Solve(const Task& task) {
   return EXIT_SUCCESS;
 }
 
-int Main(std::string_view factorization, const Task& task) {
-  if (factorization == "eigen") {
-    return Solve<FactorizedInverse<Eigen::SimplicialLDLT<Sparse>>>(task);
-  }
-  if (factorization == "cholmod") {
-    return Solve<FactorizedInverse<Eigen::CholmodSupernodalLLT<Sparse>>>(task);
-  }
-  return Solve<
-      Spectra::SymShiftInvert<double, Eigen::Sparse, Eigen::Sparse, Eigen::Lower, Eigen::Lower>>(
-      task);
-}
-
 }  // namespace
 }  // namespace carillon
 
 int main(int argc, char** argv) try {
-  if (argc != 6) {
-    std::fputs("usage: spectra_peer eigen|cholmod|default FOLDER COUNT SHIFT TOLERANCE\n", stderr);
+  if (argc != 5) {
+    std::fputs("usage: spectra_peer FOLDER COUNT SHIFT TOLERANCE\n", stderr);
     return EXIT_FAILURE;
   }
-  return carillon::Main(argv[1], {.folder = argv[2],
-                                  .count = std::atoi(argv[3]),
-                                  .shift = std::atof(argv[4]),
-                                  .tolerance = std::atof(argv[5])});
+  return carillon::Solve({.folder = argv[1],
+                          .count = std::atoi(argv[2]),
+                          .shift = std::atof(argv[3]),
+                          .tolerance = std::atof(argv[4])});
 } catch (const std::exception& error) {
   std::fprintf(stderr, "spectra_peer: %s\n", error.what());
   return EXIT_FAILURE;
