@@ -66,7 +66,7 @@ struct SolveOptions {
 /// to nearly all digits, it is raised slightly.
 ///
 /// `nodes` are the positions of the nodes, in the order of the unknowns.
-/// Errors: BODY_IN_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before memory is allocated),
+/// Errors: MESH_SEVERAL_PIECES, TOO_MANY_MODES, MEMORY_TOO_SMALL (before memory is allocated),
 /// OUT_OF_MEMORY, MESH_TOO_LARGE, VERIFICATION_FAILED.
 absl::StatusOr<DeformationModes> SolveDeformationModes(const SystemMatrices& system,
                                                        const std::vector<Point>& nodes,

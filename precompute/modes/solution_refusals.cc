@@ -56,7 +56,7 @@ absl::Status WithLowerLimit(absl::Status refusal, int unknown_count,
 
 absl::Status SeveralPieces(int free_motions, int rigid_count, bool is_fixed) {
   return Refusal(
-      absl::StatusCode::kInvalidArgument, "BODY_IN_SEVERAL_PIECES",
+      absl::StatusCode::kInvalidArgument, "MESH_SEVERAL_PIECES",
       absl::StrCat("the body can move in ", free_motions,
                    " ways without bending, a body in one piece",
                    is_fixed ? absl::StrCat(" fixed as this one in ", rigid_count) : " in six",
@@ -66,7 +66,7 @@ absl::Status SeveralPieces(int free_motions, int rigid_count, bool is_fixed) {
 
 absl::Status NamingSlenderness(absl::Status refusal, const Slenderness& body) {
   const std::string reason = ToErrorInfo(refusal).reason();
-  if (reason != "VERIFICATION_FAILED" && reason != "BODY_IN_SEVERAL_PIECES") return refusal;
+  if (reason != "VERIFICATION_FAILED" && reason != "MESH_SEVERAL_PIECES") return refusal;
   const double slenderness = kFirstBending / (std::sqrt(body.lowest_eigenvalue) * body.extent_m);
   const double rounding = ResidualOfRounding(body.stiffest, body.lowest_eigenvalue);
   if (!(slenderness > kSlender) || rounding < kMostRounding) return refusal;

@@ -54,7 +54,7 @@ absl::StatusOr<std::string> ReadOne(const std::filesystem::path& path) {
   const bool opened = file.is_open();
   std::string bytes = ReadUpTo(file, kMostMeshBytes + 1);
   if (!opened || file.bad()) {
-    return Refusal(absl::StatusCode::kNotFound, "MESH_FILE_NOT_READABLE",
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat(path.string(), " cannot be read (", std::strerror(errno),
                                 "): check that it is a file, its name and its permissions"));
   }

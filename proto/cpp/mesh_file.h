@@ -20,7 +20,7 @@ std::string MeshFormatOf(const std::string& path);
 ///     must be in the folder of `path` or below it.
 ///   - Other files it returns as they are.
 ///
-/// Errors: NotFound (MESH_FILE_NOT_READABLE), ResourceExhausted (MESH_TOO_LARGE: above 256 MiB),
+/// Errors: NotFound (FILE_NOT_FOUND), ResourceExhausted (MESH_TOO_LARGE: above 256 MiB),
 /// InvalidArgument (MESH_EMPTY; MESH_UNREADABLE: a buffer's file is elsewhere).
 absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
 

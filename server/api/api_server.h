@@ -87,8 +87,8 @@ class ApiServer {
   static absl::Status Check(const ApiSettings& settings, uint32_t sample_rate_hz);
 
   /// Starts to serve. Calls are answered as soon as Start has returned. Errors: InvalidArgument
-  /// (INVALID_ADDRESS), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network address
-  /// without TLS or without an access file, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE, ADDRESS_IN_USE,
+  /// (INVALID_CONFIGURATION), FailedPrecondition (TLS_REQUIRED, ACCESS_FILE_REQUIRED: a network
+  /// address without TLS or without an access file, TLS_UNUSABLE, ACCESS_FILE_UNUSABLE,
   /// LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<ApiServer>> Start(const ApiSettings& settings,
                                                           const ServedRooms& rooms);

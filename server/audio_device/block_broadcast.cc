@@ -72,7 +72,7 @@ absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> BlockBroadcast::Subscr
     std::function<void()> wake) {
   const MutexLock lock(&mutex_);
   if (listeners_.size() >= kMaxListenerCount) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_LISTENERS",
+    return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CALLS",
                    absl::StrCat(kMaxListenerCount,
                                 " clients listen already; end one of their Listen calls first"));
   }

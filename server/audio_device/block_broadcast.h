@@ -76,7 +76,7 @@ class BlockBroadcast {
   void Deliver(absl::FunctionRef<void(const RenderedBlock&)> observe = [](const RenderedBlock&) {});
 
   /// Adds a listener, which gets all blocks from the next one on. Deliver calls `wake` after it has
-  /// queued blocks. `wake` must not block. Errors: ResourceExhausted (TOO_MANY_LISTENERS).
+  /// queued blocks. `wake` must not block. Errors: ResourceExhausted (TOO_MANY_CALLS).
   absl::StatusOr<std::unique_ptr<Listener>> Subscribe(std::function<void()> wake);
 
   /// Tells the listeners that no further block will come.

@@ -44,7 +44,7 @@ absl::Status CheckMayWrite(const std::string& path) {
   if (error == 0 && faccessat(AT_FDCWD, changed.c_str(), W_OK, AT_EACCESS) != 0) error = errno;
   if (error == 0) return absl::OkStatus();
   return Refusal(
-      absl::StatusCode::kFailedPrecondition, "AUDIO_FILE_FAILED",
+      absl::StatusCode::kFailedPrecondition, "OUTPUT_NOT_WRITABLE",
       absl::StrCat("cannot write \"", path, "\": ", std::generic_category().message(error),
                    "; name a file in a folder that exists and may be written"));
 }
@@ -74,13 +74,13 @@ absl::Status CheckDevice(absl::string_view specification) {
   }
   if (!absl::ConsumePrefix(&rest, "file:") || rest.empty()) {
     return Refusal(
-        absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
+        absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
         absl::StrCat("\"", specification,
                      "\" names no audio device; say auto, portaudio, portaudio:NAME, null "
                      "or file:PATH"));
   }
   if (!HoldsOther(std::string(rest))) return CheckMayWrite(std::string(rest));
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_AUDIO_DEVICE",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
                  absl::StrCat("\"", rest,
                               "\" holds something other than a WAV sound, and stays as it is: "
                               "name another file with --audio-device file:PATH"));

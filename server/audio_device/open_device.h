@@ -23,7 +23,7 @@ struct DeviceSettings {
 };
 
 /// Checks DeviceSettings::specification without opening a device. Errors: InvalidArgument
-/// (INVALID_AUDIO_DEVICE: it names no kind of device, or a file that holds something else than a
+/// (INVALID_CONFIGURATION: it names no kind of device, or a file that holds something else than a
 /// sound).
 absl::Status CheckDevice(absl::string_view specification);
 

@@ -29,7 +29,7 @@ absl::StatusOr<WavWriter> WavWriter::Make(const std::string& path, uint32_t samp
   info.format = SF_FORMAT_RF64 | SF_FORMAT_FLOAT;
   File file(sf_open(path.c_str(), SFM_WRITE, &info));
   if (file == nullptr) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "AUDIO_FILE_FAILED",
+    return Refusal(absl::StatusCode::kFailedPrecondition, "OUTPUT_NOT_WRITABLE",
                    absl::StrCat("cannot write \"", path, "\": ", sf_strerror(nullptr),
                                 "; name a file in a folder that exists and may be written"));
   }
@@ -47,7 +47,7 @@ absl::Status WavWriter::Write(std::span<const float> frames) {
     frame_count_ += count;
     return absl::OkStatus();
   }
-  return Refusal(absl::StatusCode::kDataLoss, "AUDIO_FILE_FAILED",
+  return Refusal(absl::StatusCode::kDataLoss, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat("cannot write on to \"", path_, "\": ", sf_strerror(file),
                               "; its sound is lost until there is space again"));
 }

@@ -14,11 +14,11 @@ namespace carillon {
 /// updated with each write, so that a file is readable even if its writer was killed.
 class WavWriter {
  public:
-  /// Truncates or creates `path`. Errors: FailedPrecondition (AUDIO_FILE_FAILED).
+  /// Truncates or creates `path`. Errors: FailedPrecondition (OUTPUT_NOT_WRITABLE).
   static absl::StatusOr<WavWriter> Make(const std::string& path, uint32_t sample_rate_hz,
                                         uint32_t channel_count);
 
-  /// Appends interleaved frames. Errors: DataLoss (AUDIO_FILE_FAILED), for instance because the
+  /// Appends interleaved frames. Errors: DataLoss (OUTPUT_NOT_WRITABLE), for instance because the
   /// disk is full. The file then lacks these frames, and the next frames follow the last ones that
   /// were written.
   absl::Status Write(std::span<const float> frames);

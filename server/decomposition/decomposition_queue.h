@@ -87,7 +87,7 @@ class DecompositionQueue {
 
   /// Returns the jobs that match, newest first, up to 1000 a page; a `page_size` of 0 means 100. A
   /// page may have fewer jobs than that even if more pages follow. Errors: InvalidArgument
-  /// (INVALID_PAGE).
+  /// (INVALID_SETTINGS).
   absl::StatusOr<DecompositionJobPage> List(int page_size, const std::string& page_token,
                                             const JobFilter& filter = {});
 

@@ -39,7 +39,7 @@ absl::Status Validate(const HertzContact& hertz) {
     return absl::OkStatus();
   }
   return Invalid(
-      "INVALID_HERTZ_CONTACT",
+      "CONTACT_MALFORMED",
       "masses, radii, the approach speed and the striker's Young's modulus must be above "
       "zero, its Poisson's ratio above -1 and below 0.5; leave out what is not known");
 }
@@ -49,7 +49,7 @@ absl::Status Validate(const HertzContact& hertz) {
 absl::Status ValidatePoint(const Point& point) {
   if (Finite(point)) return absl::OkStatus();
   return Invalid(
-      "POINT_NOT_FINITE",
+      "CONTACT_MALFORMED",
       absl::StrCat("the point of contact ", Text(point),
                    " has a coordinate that is not a finite number: send metres in the object's "
                    "frame"));
@@ -60,7 +60,7 @@ absl::Status ValidateWeights(const std::array<double, 3>& weights) {
   const double sum = weights[0] + weights[1] + weights[2];
   const bool inside = std::ranges::all_of(weights, [](double w) { return w >= -kRounding; });
   if (inside && std::abs(sum - 1) <= kRounding) return absl::OkStatus();
-  return Invalid("INVALID_WEIGHTS",
+  return Invalid("CONTACT_MALFORMED",
                  absl::StrCat("barycentric weights ", Text(weights),
                               ": none may be below zero, and their sum must be 1"));
 }
@@ -69,14 +69,14 @@ absl::Status Validate(const ContactImpulse& contact) {
   // Impulses are rendered in single precision.
   if (!Finite(contact.impulse_newton_seconds, std::numeric_limits<float>::max())) {
     return Invalid(
-        "IMPULSE_NOT_FINITE",
+        "CONTACT_MALFORMED",
         absl::StrCat("the impulse ", Text(contact.impulse_newton_seconds),
                      " has a component that is not a finite number, or is beyond 3.4e38: send N s "
                      "in the object's frame"));
   }
   const double duration_s = contact.duration_s.value_or(0);
   if (!(duration_s >= 0 && duration_s <= kLongestContactS)) {
-    return Invalid("INVALID_DURATION",
+    return Invalid("CONTACT_MALFORMED",
                    absl::StrCat("a contact of ", duration_s, " s: the duration must lie from 0 to ",
                                 kLongestContactS, " s, or be absent"));
   }
@@ -93,7 +93,7 @@ absl::Status Validate(const Roughness& roughness) {
     return absl::OkStatus();
   }
   return Invalid(
-      "INVALID_ROUGHNESS",
+      "CONTACT_MALFORMED",
       absl::StrCat("a roughness of depth ", roughness.depth, ", irregularities of ",
                    roughness.irregularity_length_m, " m, travelled at ",
                    roughness.travel_speed_m_per_s, " m/s: the depth must be 0 to ", kDeepest,

@@ -40,17 +40,16 @@ struct Roughness {
 /// Longer contacts are refused.
 inline constexpr double kLongestContactS = 0.1;
 
-/// Checks a point. Errors: INVALID_ARGUMENT (POINT_NOT_FINITE).
+/// Checks a point. Errors: INVALID_ARGUMENT (CONTACT_MALFORMED).
 absl::Status ValidatePoint(const Point& point);
 
-/// Checks weights. Errors: INVALID_ARGUMENT (INVALID_WEIGHTS).
+/// Checks weights. Errors: INVALID_ARGUMENT (CONTACT_MALFORMED).
 absl::Status ValidateWeights(const std::array<double, 3>& weights);
 
-/// Checks a contact. Errors: INVALID_ARGUMENT with IMPULSE_NOT_FINITE, POINT_NOT_FINITE,
-/// INVALID_DURATION, INVALID_HERTZ_CONTACT or INVALID_WEIGHTS.
+/// Checks a contact. Errors: INVALID_ARGUMENT (CONTACT_MALFORMED).
 absl::Status Validate(const ContactImpulse& contact);
 
-/// Checks a roughness. Errors: INVALID_ARGUMENT (INVALID_ROUGHNESS).
+/// Checks a roughness. Errors: INVALID_ARGUMENT (CONTACT_MALFORMED).
 absl::Status Validate(const Roughness& roughness);
 
 }  // namespace carillon

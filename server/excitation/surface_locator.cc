@@ -27,7 +27,7 @@ namespace {
 constexpr size_t kProbedThreadCount = 4;
 
 absl::Status Malformed(absl::string_view message) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "SURFACE_MALFORMED", message);
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED", message);
 }
 
 absl::Status CheckTriangles(absl::string_view name,
@@ -292,7 +292,7 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
                 .given_triangle = std::nullopt};
   if (index_->Run(search)) return index_->Describe(search);
   return Refusal(
-      absl::StatusCode::kInvalidArgument, "POINT_TOO_FAR",
+      absl::StatusCode::kInvalidArgument, "CONTACT_MALFORMED",
       "the point of contact is too far away to tell what is nearest to it: send metres in "
       "the object's frame");
 }
@@ -302,7 +302,7 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint&
   const LocatorSurfaces& surfaces = index_->surfaces;
   if (at.triangle >= surfaces.given_triangles.size()) {
     return Refusal(
-        absl::StatusCode::kInvalidArgument, "TRIANGLE_OUT_OF_RANGE",
+        absl::StatusCode::kInvalidArgument, "CONTACT_MALFORMED",
         absl::StrCat("triangle ", at.triangle, " of a surface of ", surfaces.given_triangles.size(),
                      ": triangles count from zero, in the order of the mesh file"));
   }

@@ -34,20 +34,20 @@ struct LocatedPoint {
 /// once, except render threads.
 class SurfaceLocator {
  public:
-  /// Makes a locator. Errors: INVALID_ARGUMENT (SURFACE_MALFORMED: no triangle, or an index out of
-  /// range), RESOURCE_EXHAUSTED (SERVER_OUT_OF_MEMORY).
+  /// Makes a locator. Errors: INVALID_ARGUMENT (MODAL_MODEL_MALFORMED: no triangle, or an index
+  /// out of range), RESOURCE_EXHAUSTED (SERVER_OUT_OF_MEMORY).
   static absl::StatusOr<std::unique_ptr<SurfaceLocator>> Make(const LocatorSurfaces& surfaces);
   ~SurfaceLocator();
 
   /// Returns the point of the sounding surface nearest to `point`, which is in the model's frame
   /// and size, metres. Where several triangles are equally near, it is on the one with the lowest
-  /// index. INVALID_ARGUMENT (POINT_NOT_FINITE, POINT_TOO_FAR).
+  /// index. INVALID_ARGUMENT (CONTACT_MALFORMED).
   absl::StatusOr<LocatedPoint> Nearest(const Point& point) const;
 
   /// Returns the point of the sounding surface that is nearest to `at`, a point on a triangle of
   /// the surface as given. Only the triangles of the sounding surface that lie on that given
   /// triangle are searched. If there are none, because a repair has removed the given triangle, all
-  /// are. Errors: INVALID_ARGUMENT (TRIANGLE_OUT_OF_RANGE, INVALID_WEIGHTS).
+  /// are. Errors: INVALID_ARGUMENT (CONTACT_MALFORMED).
   absl::StatusOr<LocatedPoint> OnGivenTriangle(const SurfacePoint& at) const;
 
  private:

@@ -48,8 +48,8 @@ class DeviceKeeper {
   using Wake = std::function<void()>;
 
   /// Plays `source`. `source` and `clock` must outlive the keeper. If a sound card does not exist
-  /// yet, the keeper waits for it. Errors: InvalidArgument (INVALID_AUDIO_DEVICE),
-  /// FailedPrecondition (AUDIO_FILE_FAILED, WORKER_NOT_FOUND).
+  /// yet, the keeper waits for it. Errors: InvalidArgument (INVALID_CONFIGURATION),
+  /// FailedPrecondition (OUTPUT_NOT_WRITABLE, WORKER_NOT_FOUND).
   static absl::StatusOr<std::unique_ptr<DeviceKeeper>> Start(const DeviceSettings& settings,
                                                              FrameSource& source, Clock& clock,
                                                              Log log, Wake wake = nullptr);

@@ -19,10 +19,9 @@
 namespace carillon {
 namespace {
 
-absl::Status CannotServe(const std::string& address, absl::string_view reason,
-                         absl::string_view why) {
+absl::Status CannotServe(const std::string& address, absl::string_view why) {
   return Refusal(
-      absl::StatusCode::kFailedPrecondition, reason,
+      absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
       absl::StrCat("cannot serve metrics on ", address, ": ", why,
                    "; let --metrics name a free port at an IPv4 address of this machine, "
                    "such as 127.0.0.1:9464"));
@@ -40,7 +39,7 @@ absl::StatusOr<sockaddr_in> Resolve(const std::string& address) {
   if (error != 0) {
     const std::string why =
         error == EAI_SYSTEM ? std::generic_category().message(errno) : gai_strerror(error);
-    return CannotServe(address, "LISTEN_FAILED", why);
+    return CannotServe(address, why);
   }
   const absl::Cleanup free_found = [found] { freeaddrinfo(found); };
   return *reinterpret_cast<const sockaddr_in*>(found->ai_addr);
@@ -57,8 +56,7 @@ int TryToBind(const sockaddr_in& address) {
 }
 
 absl::Status CannotBind(const std::string& address, int error) {
-  return CannotServe(address, error == EADDRINUSE ? "ADDRESS_IN_USE" : "LISTEN_FAILED",
-                     std::generic_category().message(error));
+  return CannotServe(address, std::generic_category().message(error));
 }
 
 }  // namespace

@@ -10,8 +10,7 @@ namespace carillon {
 
 /// Returns `address`, which is HOST:PORT, with the IPv4 address of its host, and binds a socket
 /// there for a moment. Debian's civetweb knows no IPv6 and does not say why it cannot listen.
-/// Errors: FailedPrecondition (ADDRESS_IN_USE; LISTEN_FAILED: the host has no IPv4 address, or this
-/// machine may not listen there).
+/// Errors: FailedPrecondition (LISTEN_FAILED).
 absl::StatusOr<std::string> FindMetricsAddress(const std::string& address);
 
 /// Checks the address while a daemon may be serving there. Errors: FailedPrecondition

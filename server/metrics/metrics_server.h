@@ -33,7 +33,7 @@ class MetricsServer {
   /// Returns the present metrics. The server's threads call it for each request.
   using Read = std::function<std::vector<Metric>()>;
 
-  /// `address` is HOST:PORT. Errors: FailedPrecondition (ADDRESS_IN_USE, LISTEN_FAILED).
+  /// `address` is HOST:PORT. Errors: FailedPrecondition (LISTEN_FAILED).
   static absl::StatusOr<std::unique_ptr<MetricsServer>> Start(const std::string& address,
                                                               Read read);
   virtual ~MetricsServer() = default;

@@ -72,7 +72,7 @@ class JobStore {
   absl::StatusOr<std::vector<JobRecord>> Unfinished();
 
   /// Returns the jobs newest first, up to 1000 a page; a `page_size` of 0 means 100. Errors:
-  /// InvalidArgument (INVALID_PAGE).
+  /// InvalidArgument (INVALID_SETTINGS).
   absl::StatusOr<JobPage> List(int page_size, const std::string& page_token,
                                const JobFilter& filter = {});
 

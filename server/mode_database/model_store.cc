@@ -39,7 +39,7 @@ absl::Status CheckTag(const std::string& tag) {
                absl::string_view("._:/+-").find(static_cast<char>(c)) != absl::string_view::npos;
       });
   if (fits) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_TAG",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat("\"", tag, "\" is no tag: give one to ", kMaxTagBytes,
                               " letters, digits or any of . _ : / + -"));
 }

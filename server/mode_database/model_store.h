@@ -123,7 +123,7 @@ class ModelStore {
 
   /// Returns the models, newest first, at most 1000 a page. A `page_size` of 0 means 100. A page
   /// also ends when its headers together have kMaxHeaderBytes. Errors: InvalidArgument
-  /// (INVALID_PAGE).
+  /// (INVALID_SETTINGS).
   absl::StatusOr<ModelPage> List(const ModelFilter& filter, int page_size,
                                  const std::string& page_token);
 
@@ -135,7 +135,7 @@ class ModelStore {
   absl::StatusOr<std::optional<v1::Material>> Material(const std::string& digest);
 
   /// Changes a model, and returns it without its arrays. Errors: NotFound (MODAL_MODEL_NOT_FOUND),
-  /// InvalidArgument (INVALID_TAG), DataLoss (MODAL_MODEL_CORRUPT), ResourceExhausted
+  /// InvalidArgument (INVALID_SETTINGS), DataLoss (MODAL_MODEL_CORRUPT), ResourceExhausted
   /// (TOO_MANY_TAGS).
   absl::StatusOr<ModelSummary> Update(const std::string& digest, const ModelChange& change);
 

@@ -20,7 +20,7 @@ absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
   PageRange page{page_size == 0 ? 100 : std::min<int64_t>(page_size, kMaxPageSize),
                  std::numeric_limits<int64_t>::max()};
   if (page.size < 0) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    absl::StrCat("page_size is ", page_size, ": give zero or more"));
   }
   if (page_token.empty()) return page;
@@ -30,7 +30,7 @@ absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
       page_token == PageToken(list, page.below)) {
     return page;
   }
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_PAGE",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat("page_token is not one of an earlier answer that listed ", list,
                               ": leave it empty to start anew"));
 }

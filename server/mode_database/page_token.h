@@ -24,8 +24,8 @@ struct PageRange {
 std::string PageToken(absl::string_view list, int64_t last_key);
 
 /// Returns a range of the list named `list`. A `page_size` of 0 means 100. PageToken has made the
-/// token, unless it is empty and asks for the newest rows. Errors: InvalidArgument (INVALID_PAGE),
-/// also for the token of another list.
+/// token, unless it is empty and asks for the newest rows. Errors: InvalidArgument
+/// (INVALID_SETTINGS), also for the token of another list.
 absl::StatusOr<PageRange> ParsePage(absl::string_view list, int page_size,
                                     absl::string_view page_token);
 

@@ -318,9 +318,8 @@ void ContactIntake::Push(MixerEvent& event, double frame) {
 
 absl::StatusOr<double> ContactIntake::FrameOfImpulse(double time_offset_s) const {
   if (!(time_offset_s >= 0)) {
-    return Invalid("INVALID_TIME_OFFSET",
-                   absl::StrCat("the impulse lies ", time_offset_s,
-                                " s after its step; it must be zero or more"));
+    return Invalid("CONTACT_MALFORMED", absl::StrCat("the impulse lies ", time_offset_s,
+                                                     " s after its step; it must be zero or more"));
   }
   const double frame = FrameOf(time_s_ + time_offset_s);
   RETURN_IF_ERROR(CheckAhead(frame));

@@ -71,7 +71,7 @@ class OfflineRenderer {
   static constexpr double kMaxDurationS = 86400;
 
   /// `bodies` and `transfers` must outlive the renderer. `transfers` is null if none are stored.
-  /// Errors: InvalidArgument (INVALID_SETTINGS, INVALID_GAIN, INVALID_HEARING, INVALID_POSE).
+  /// Errors: InvalidArgument (INVALID_SETTINGS, INVALID_POSE).
   static absl::StatusOr<std::unique_ptr<OfflineRenderer>> Make(const OfflineSettings& settings,
                                                                BodyCache& bodies,
                                                                TransferStore* transfers = nullptr);

@@ -37,7 +37,7 @@ ObjectProperties Changed(ObjectProperties properties, const ObjectChange& change
 absl::Status ValidateGlide(double glide_s) {
   constexpr double kLongestGlideS = 10;
   if (glide_s >= 0 && glide_s <= kLongestGlideS) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_GLIDE",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat("glide_s is ", glide_s, "; it must be 0 to ", kLongestGlideS));
 }
 

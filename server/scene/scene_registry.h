@@ -80,7 +80,7 @@ class SceneRegistry {
   absl::StatusOr<SceneEntry> GetScene(uint64_t scene) const;
 
   /// Changes the volume of a scene. The volume glides to its new value within 30 ms. Errors:
-  /// NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_GAIN).
+  /// NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_SETTINGS).
   absl::Status ChangeVolume(uint64_t scene, const SceneVolumeChange& change);
 
   /// Fades all sound of a scene out within 30 ms. Later contacts sound as usual. Errors: NotFound
@@ -114,7 +114,7 @@ class SceneRegistry {
 
   /// Changes an object. If more than the pose changes, a new oscillator bank takes further
   /// impulses, and the old bank decays. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND),
-  /// InvalidArgument (INVALID_GLIDE), and those of MakeSoundingObject.
+  /// InvalidArgument (INVALID_SETTINGS), and those of MakeSoundingObject.
   absl::StatusOr<PlacedObject> UpdateObject(uint64_t scene, uint32_t handle,
                                             const ObjectChange& change);
 
@@ -123,7 +123,7 @@ class SceneRegistry {
   void TakeOverTransfers(const std::string& model_digest);
 
   /// Moves the listener to `pose` within `glide_s`, which has the limits of ObjectChange::glide_s.
-  /// Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_POSE, INVALID_GLIDE).
+  /// Errors: NotFound (SCENE_NOT_FOUND), InvalidArgument (INVALID_POSE, INVALID_SETTINGS).
   absl::Status UpdateListener(uint64_t scene, const Pose& pose, double glide_s);
 
   /// Fades the object out. Errors: NotFound (SCENE_NOT_FOUND, OBJECT_NOT_FOUND).

@@ -11,7 +11,7 @@ namespace {
 
 absl::Status InRange(absl::string_view what, double value, double least, double most) {
   if (value >= least && value <= most) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_HEARING",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
 }
 
@@ -26,7 +26,7 @@ Place PlaceOf(const Pose& pose) {
 
 absl::Status Validate(const SceneSpace& space) {
   if (space.hearing.near_field && !space.hearing.directivity) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_HEARING",
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    "near_field needs directivity, whose gains it changes: set both");
   }
   absl::Status status =

@@ -24,7 +24,7 @@ struct SceneSpace {
   bool operator==(const SceneSpace&) const = default;
 };
 
-/// Checks a space. Errors: InvalidArgument (INVALID_HEARING, INVALID_POSE).
+/// Checks a space. Errors: InvalidArgument (INVALID_SETTINGS, INVALID_POSE).
 absl::Status Validate(const SceneSpace& space);
 
 /// Makes the voice of an object at `pose`, or at the origin. Returns null for a scene without

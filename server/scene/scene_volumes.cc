@@ -12,7 +12,7 @@ namespace carillon {
 absl::Status ValidateGain(double gain) {
   constexpr double kLargestGain = 1000;
   if (gain >= 0 && gain <= kLargestGain) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_GAIN",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat("the gain is ", gain, "; it must be 0 to ", kLargestGain,
                               ", linear: 0.5 is 6 dB less"));
 }

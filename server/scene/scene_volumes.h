@@ -14,7 +14,7 @@
 
 namespace carillon {
 
-/// Checks a gain. Errors: InvalidArgument (INVALID_GAIN: not 0 to 1000).
+/// Checks a gain. Errors: InvalidArgument (INVALID_SETTINGS: not 0 to 1000).
 absl::Status ValidateGain(double gain);
 
 /// The volume of a scene.
@@ -37,13 +37,13 @@ class SceneVolumes {
   /// `mixer` must outlive the volumes.
   explicit SceneVolumes(Mixer& mixer) : mixer_(mixer) {}
 
-  /// Opens the bus of a new scene. Errors: InvalidArgument (INVALID_GAIN), ResourceExhausted
+  /// Opens the bus of a new scene. Errors: InvalidArgument (INVALID_SETTINGS), ResourceExhausted
   /// (TOO_MANY_SCENES).
   absl::StatusOr<BusId> Open(uint64_t scene, const std::string& owner, double gain);
 
   void Close(uint64_t scene);
 
-  /// Changes the volume of a scene. Errors: InvalidArgument (INVALID_GAIN).
+  /// Changes the volume of a scene. Errors: InvalidArgument (INVALID_SETTINGS).
   absl::Status Change(uint64_t scene, const SceneVolumeChange& change);
 
   SceneVolume volume(uint64_t scene) const;

@@ -21,7 +21,7 @@ constexpr double kLeastMassShare = 1e-8;
 
 absl::Status NotPhysical(absl::string_view what, double value, double most) {
   return Refusal(
-      absl::StatusCode::kFailedPrecondition, "SHAPES_NOT_PHYSICAL",
+      absl::StatusCode::kFailedPrecondition, "MODAL_MODEL_MALFORMED",
       absl::StrCat("the modal model has ", what, " of ", value,
                    ", but a body of its size has at most ", most, ": compute or export it again"));
 }

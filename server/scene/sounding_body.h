@@ -32,8 +32,8 @@ struct SoundingBody {
 /// from every thread.
 class BodyCache {
  public:
-  /// Returns the body of a model. Errors: InvalidArgument (SURFACE_MALFORMED), FailedPrecondition
-  /// (SHAPES_NOT_PHYSICAL).
+  /// Returns the body of a model. Errors: InvalidArgument or FailedPrecondition
+  /// (MODAL_MODEL_MALFORMED).
   absl::StatusOr<std::shared_ptr<const SoundingBody>> Get(std::shared_ptr<const ModalModel> model);
 
  private:

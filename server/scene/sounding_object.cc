@@ -22,7 +22,7 @@ constexpr double kLargestGain = 1000;
 constexpr double kPoissonTolerance = 1.0001e-4;
 
 absl::Status OutOfRange(absl::string_view what, double value, double least, double most) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_OBJECT",
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
 }
 

@@ -78,7 +78,7 @@ struct MixerBus {
 };
 
 /// Applies material and size to a model, and puts its oscillator bank with `voice` on a bus.
-/// Errors: InvalidArgument (INVALID_OBJECT: size or gain out of range; INVALID_POSE),
+/// Errors: InvalidArgument (INVALID_SETTINGS: size or gain out of range; INVALID_POSE),
 /// FailedPrecondition (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz),
 /// ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer.
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,

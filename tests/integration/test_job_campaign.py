@@ -34,7 +34,7 @@ KINDS = {
     "refused": (1, "MESH_NOT_CLOSED"),
     "crashes": (2, "WORKER_CRASHED"),
     "eats memory": (4, "OUT_OF_MEMORY"),
-    "floods its pipe": (5, "WORKER_GARBAGE"),
+    "floods its pipe": (5, "WORKER_CRASHED"),
     "takes too long": (6, "TIMEOUT"),
     "is cancelled": (7, "cancelled"),
 }

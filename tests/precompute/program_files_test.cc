@@ -59,7 +59,7 @@ TEST_F(ProgramFilesTest, ModelFileIsTheStoredForm) {
 
 TEST_F(ProgramFilesTest, FilesThatAreNotThereAreRefused) {
   EXPECT_EQ(ReasonOf(Run(folder + "/none.obj --out " + model + " --material brass --json")),
-            "MESH_FILE_NOT_READABLE");
+            "FILE_NOT_FOUND");
   EXPECT_EQ(ReasonOf(Run(bar + " --unit mm --element linear --nodes 100 --material brass --json "
                                "--out /nowhere/bar.modes")),
             "OUTPUT_NOT_WRITABLE");
@@ -67,7 +67,7 @@ TEST_F(ProgramFilesTest, FilesThatAreNotThereAreRefused) {
 
 TEST_F(ProgramFilesTest, WhatIsNoFileOfAMeshIsRefused) {
   const std::string rest = " --out " + model + " --format obj --material brass --json";
-  EXPECT_EQ(ReasonOf(Run(folder + rest)), "MESH_FILE_NOT_READABLE");
+  EXPECT_EQ(ReasonOf(Run(folder + rest)), "FILE_NOT_FOUND");
   EXPECT_EQ(ReasonOf(Run("/dev/zero" + rest)), "MESH_TOO_LARGE");
 }
 

@@ -41,12 +41,12 @@ class RequestTest(DaemonTest):
         self.client.wait(self.client.create(meshes.bar(), "obj", material=MATERIAL))
         models = [found.name for found in self.client.list()]
         request = admin_service_pb2.CollectGarbageRequest
-        self.assert_refused(lambda: self.admin.CollectGarbage(request()), "INVALID_BUDGET")
-        self.assert_refused(lambda: self.admin.CollectGarbage(request(dry_run=True)), "INVALID_BUDGET")
+        self.assert_refused(lambda: self.admin.CollectGarbage(request()), "INVALID_SETTINGS")
+        self.assert_refused(lambda: self.admin.CollectGarbage(request(dry_run=True)), "INVALID_SETTINGS")
         self.assert_refused(lambda: self.admin.CollectGarbage(request(budget_bytes=1, delete_unpinned=True)),
-                            "INVALID_BUDGET")
+                            "INVALID_SETTINGS")
         self.assert_refused(lambda: self.admin.CollectGarbage(request(budget_bytes=1, delete_unused_meshes=True)),
-                            "INVALID_BUDGET")
+                            "INVALID_SETTINGS")
         self.assertEqual(self.admin.CollectGarbage(request(delete_unused_meshes=True)).deleted_count, 0)
         self.daemon.command("db", "collect", "--unused-meshes")
         self.assertEqual([found.name for found in self.client.list()], models)

@@ -90,7 +90,7 @@ absl::Status Diagnose(const Program& program) {
   }
   if (fault_count == 0) return absl::OkStatus();
   return Refusal(
-      absl::StatusCode::kFailedPrecondition, "FAULTS_FOUND",
+      absl::StatusCode::kFailedPrecondition, "NOT_SERVING",
       absl::StrCat("see the findings that are a FAULT, of which there are ", fault_count));
 }
 

@@ -9,7 +9,7 @@ namespace carillon::cli {
 /// Prints a line for the settings of the daemon, as `carillond --check-config` judges them, and one
 /// for the health of each service, with what to do where something is wrong. Prints the same as
 /// JSON if that is asked for: {"fault_count": 1, "findings": [{"subject": ..., "verdict": "OK",
-/// "FAULT" or "UNKNOWN", "text": ...}]}. Errors: FailedPrecondition (FAULTS_FOUND).
+/// "FAULT" or "UNKNOWN", "text": ...}]}. Errors: FailedPrecondition (NOT_SERVING).
 absl::Status Diagnose(const Program& program);
 
 }  // namespace carillon::cli

@@ -134,8 +134,7 @@ absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::s
     return WhyNotFound(daemon, text, shown);
   }
   ASSIGN_OR_RETURN(const auto models, daemon.ListModalModels());
-  auto found =
-      Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "MODAL_MODEL_AMBIGUOUS", "model"});
+  auto found = Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "NAME_AMBIGUOUS", "model"});
   return absl::IsNotFound(found.status()) ? WhyNotFound(daemon, text, found.status()) : found;
 }
 
@@ -169,7 +168,7 @@ absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::str
   if (absl::StartsWith(text, kJobs)) return text;
   ASSIGN_OR_RETURN(const auto jobs, daemon.ListJobs());
   return Choose(jobs, std::string(absl::StripPrefix(text, kModels)),
-                {kJobs, "JOB_NOT_FOUND", "JOB_AMBIGUOUS", "job"});
+                {kJobs, "JOB_NOT_FOUND", "NAME_AMBIGUOUS", "job"});
 }
 
 }  // namespace carillon::cli

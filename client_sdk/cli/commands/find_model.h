@@ -10,7 +10,7 @@ namespace carillon::cli {
 
 /// Returns the name "modalModels/{digest}" of the model that `text` means: its name, its label, or
 /// the first digits of its digest. Errors: NotFound (MODAL_MODEL_NOT_FOUND, with the state of the
-/// job that has yet to make the model, if there is one), InvalidArgument (MODAL_MODEL_AMBIGUOUS),
+/// job that has yet to make the model, if there is one), InvalidArgument (NAME_AMBIGUOUS),
 /// and those of Client::ListModalModels.
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text);
 
@@ -24,7 +24,7 @@ std::string OtherLabel(const v1::ModalModelSummary& model, const std::string& wa
 
 /// Returns the name "jobs/{digest}" of the job that `text` means: its name, its label, or the first
 /// digits of its digest. Errors: NotFound (JOB_NOT_FOUND), InvalidArgument
-/// (JOB_AMBIGUOUS), and those of Client::ListJobs.
+/// (NAME_AMBIGUOUS), and those of Client::ListJobs.
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text);
 
 }  // namespace carillon::cli

@@ -112,7 +112,7 @@ void FollowEvents(Pipe events, worker::v1::RunEnd& end,
   }
   if (at_end || end.has_error()) return;
   *end.mutable_error() = ToErrorInfo(
-      Refusal(absl::StatusCode::kDataLoss, "WORKER_GARBAGE",
+      Refusal(absl::StatusCode::kDataLoss, "WORKER_CRASHED",
               "the decomposing process wrote to its event pipe what is no event: this is a fault "
               "in it; report it with the mesh"));
 }

@@ -24,7 +24,7 @@ bool IsLoss(const absl::Status& status) {
 
 absl::Status Validate(const SceneRegistration& registration) {
   if (registration.scene.id().empty()) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SCENE_ID",
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    "a scene that is to be registered again needs an id: set CreateSceneRequest.id");
   }
   for (size_t i = 0; i < registration.objects.size(); ++i) {

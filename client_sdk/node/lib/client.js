@@ -229,7 +229,7 @@ class Client {
     }
     if (names.length === 1) return names[0];
     if (names.length) {
-      throw new CarillonError('MODAL_MODEL_AMBIGUOUS', `'${text}' means ${names.length} of the models, for instance ` +
+      throw new CarillonError('NAME_AMBIGUOUS', `'${text}' means ${names.length} of the models, for instance ` +
         `${names[0]} and ${names[1]}; give more digits of the digest`);
     }
     const near = nearest(text, labels);

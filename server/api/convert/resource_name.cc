@@ -51,7 +51,7 @@ absl::Status ValidateSceneId(absl::string_view id) {
   const bool fits = !id.empty() && id.size() <= kLongest && absl::ascii_islower(id.front());
   if (fits && std::ranges::all_of(id, IsOfSceneId)) return absl::OkStatus();
   return Refusal(
-      absl::StatusCode::kInvalidArgument, "INVALID_SCENE_ID",
+      absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
       absl::StrCat("the id of a scene is 1 to ", kLongest,
                    " lower-case letters, digits, \".\", \"_\" and \"-\", of which the "
                    "first is a letter; this one is \"",

@@ -20,7 +20,7 @@ absl::StatusOr<std::string> ParseJobName(absl::string_view name);
 absl::StatusOr<std::string> ParseSceneName(absl::string_view name);
 
 /// Checks an id that a client gives a scene. It has 1 to 64 lower-case letters, digits, ".", "_"
-/// and "-", and begins with a letter. Errors: InvalidArgument (INVALID_SCENE_ID).
+/// and "-", and begins with a letter. Errors: InvalidArgument (INVALID_SETTINGS).
 absl::Status ValidateSceneId(absl::string_view id);
 
 struct ObjectName {

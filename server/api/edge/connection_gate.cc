@@ -47,8 +47,7 @@ constexpr std::chrono::milliseconds kPause(50);
 constexpr size_t kEventsAtOnce = 64;
 
 absl::Status Failed(const ListenAddress& address, int error) {
-  const bool in_use = error == EADDRINUSE;
-  return Refusal(absl::StatusCode::kFailedPrecondition, in_use ? "ADDRESS_IN_USE" : "LISTEN_FAILED",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
                  absl::StrCat("cannot listen on ", address.ToString(), ": ",
                               std::generic_category().message(error), "; choose another --listen"));
 }

@@ -75,7 +75,7 @@ class ConnectionGate {
 
   /// Binds the address. If its port is 0, it is set to the chosen port. The connections of the
   /// address are handed to `taker` once the gate is open. Errors: FailedPrecondition
-  /// (LISTEN_FAILED, ADDRESS_IN_USE).
+  /// (LISTEN_FAILED).
   absl::Status Listen(ListenAddress& address, std::unique_ptr<ConnectionTaker> taker);
 
   /// Begins to accept. The gate's thread calls `on_first` when a connection comes while no other is

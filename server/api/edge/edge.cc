@@ -36,7 +36,7 @@ absl::StatusOr<std::deque<ListenAddress>> Edge::Parse(const EdgeSettings& settin
     }
     if (std::ranges::any_of(
             addresses, [&](const ListenAddress& other) { return IsSameAddress(address, other); })) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
                      absl::StrCat("--listen names ", text, " twice: name each address once"));
     }
     addresses.push_back(std::move(address));

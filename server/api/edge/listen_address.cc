@@ -23,7 +23,7 @@ namespace {
 
 absl::Status InvalidAddress(absl::string_view text) {
   return Refusal(
-      absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+      absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
       absl::StrCat("\"", text,
                    "\" is not an address; write unix:PATH, HOST:PORT or [HOST]:PORT, with a "
                    "path of at most 107 bytes"));
@@ -114,7 +114,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
   // A client of gRPC reads the path as that of a URI, or as a list of paths.
   const size_t unreachable = path.find_first_of(",%?#");
   if (unreachable != absl::string_view::npos) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_ADDRESS",
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
                    absl::StrCat("no client could reach \"", text, "\", because its path has \"",
                                 path.substr(unreachable, 1),
                                 "\"; choose a path without the characters , % ? and #"));
@@ -143,7 +143,7 @@ absl::StatusOr<mode_t> PrepareSocket(const std::string& path) {
   }
   ASSIGN_OR_RETURN(const mode_t mode, SocketMode(folder));
   if (IsServed(path)) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "ADDRESS_IN_USE",
+    return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
                    absl::StrCat("a daemon serves unix:", path,
                                 " already; stop it or choose another --listen"));
   }

@@ -30,16 +30,16 @@ struct ListenAddress {
 /// free port each time.
 bool IsSameAddress(const ListenAddress& a, const ListenAddress& b);
 
-/// Parses an address. Errors: InvalidArgument (INVALID_ADDRESS).
+/// Parses an address. Errors: InvalidArgument (INVALID_CONFIGURATION).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 
 /// Checks what PrepareSocket would find, without making or removing anything. Errors: those of
-/// PrepareSocket without ADDRESS_IN_USE.
+/// PrepareSocket, but for a socket that another daemon serves.
 absl::Status CheckSocket(const std::string& path);
 
 /// Makes the folder of a Unix socket, for its owner only, unless it exists. Removes a socket that
 /// no running daemon serves. Returns the mode for the new socket, which is 0660 if only a group may
-/// enter the folder, and otherwise 0600. Errors: FailedPrecondition (LISTEN_FAILED, ADDRESS_IN_USE,
+/// enter the folder, and otherwise 0600. Errors: FailedPrecondition (LISTEN_FAILED,
 /// SOCKET_FOLDER_UNSAFE: another user owns the folder, or could replace the socket in it).
 absl::StatusOr<mode_t> PrepareSocket(const std::string& path);
 

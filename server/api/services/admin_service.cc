@@ -148,7 +148,7 @@ absl::Status AdminService::Collect(const v1::CollectGarbageRequest& request,
   const bool all = request.delete_unpinned();
   const bool only_meshes = request.delete_unused_meshes();
   if ((request.budget_bytes() > 0 ? 1 : 0) + (all ? 1 : 0) + (only_meshes ? 1 : 0) != 1) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_BUDGET",
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                    "set budget_bytes above zero, or delete_unpinned to delete every model that is "
                    "neither pinned nor sounding, or delete_unused_meshes");
   }

@@ -85,8 +85,8 @@ bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& 
 }
 
 bool DependsOnWay(const Outcome& outcome) {
-  return !outcome.killed && IsOneOf<3>(outcome.error.reason(), {"WORKER_CRASHED", "WORKER_GARBAGE",
-                                                                "MESH_TETRAHEDRALIZATION_FAILED"});
+  return !outcome.killed &&
+         IsOneOf<2>(outcome.error.reason(), {"WORKER_CRASHED", "MESH_TETRAHEDRALIZATION_FAILED"});
 }
 
 bool IsDeterministic(const Outcome& outcome) {
@@ -96,8 +96,8 @@ bool IsDeterministic(const Outcome& outcome) {
 Verdict VerdictOfReport(const std::string& reason) {
   if (IsOneOf<2>(reason, {"OUT_OF_MEMORY", "MEMORY_TOO_SMALL"})) return Verdict::kOutOfMemory;
   // These do not depend on the request, so another attempt may succeed.
-  if (IsOneOf<4>(reason, {"INTERNAL", "OUTPUT_NOT_WRITABLE", "MESH_FILE_NOT_READABLE",
-                          "WORKER_NOT_FOUND"})) {
+  if (IsOneOf<4>(reason,
+                 {"INTERNAL", "OUTPUT_NOT_WRITABLE", "FILE_NOT_FOUND", "WORKER_NOT_FOUND"})) {
     return Verdict::kCrashed;
   }
   return Verdict::kBadInput;

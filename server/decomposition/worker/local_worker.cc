@@ -150,7 +150,7 @@ void LocalWorker::Read(nanoseconds now) {
     Kill(Verdict::kCrashed, ToErrorInfo(status));
   } else if (event_byte_count_ > kFreeEventBytes + seconds * kEventBytesPerS) {
     Kill(Verdict::kCrashed,
-         InternalError("WORKER_GARBAGE",
+         InternalError("WORKER_CRASHED",
                        "the decomposing process floods its event pipe: this is a fault "
                        "in it; report it with the mesh"));
   }

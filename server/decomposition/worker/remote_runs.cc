@@ -30,7 +30,7 @@ absl::Status Expired(const std::string& digest, absl::string_view why) {
 }
 
 absl::Status Used(const std::string& digest) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "JOB_TOKEN_USED",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "JOB_TOKEN_EXPIRED",
                  absl::StrCat("a run of jobs/", digest,
                               " has brought its result with this token: the first one counts"));
 }

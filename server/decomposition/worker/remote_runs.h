@@ -55,7 +55,7 @@ class RunUpload {
 /// the daemon keeps only the hash. A token is valid for one submission of one job, until the job
 /// has ended or has a result. Results go into the job's folder, which slurm_task.h describes.
 /// Errors of every call with a token: PermissionDenied (JOB_TOKEN_WRONG), FailedPrecondition
-/// (JOB_TOKEN_EXPIRED, JOB_TOKEN_USED). Safe from every thread.
+/// (JOB_TOKEN_EXPIRED). Safe from every thread.
 class RemoteRuns {
  public:
   /// Returns a token that nobody can guess.

@@ -15,7 +15,7 @@ constexpr size_t kMaxVarintBytes = 5;
 
 absl::Status Garbage() {
   return Refusal(
-      absl::StatusCode::kDataLoss, "WORKER_GARBAGE",
+      absl::StatusCode::kDataLoss, "WORKER_CRASHED",
       "the decomposing process wrote to its event pipe what is no event: this is a fault "
       "in it; report it with the mesh");
 }

@@ -18,7 +18,7 @@ class WorkerEventReader {
   static constexpr uint32_t kMaxEventBytes = 64 << 10;
 
   /// Calls `on_event` for each event that `bytes` completes.
-  /// Errors: DataLoss (WORKER_GARBAGE). The reader cannot be used after an error.
+  /// Errors: DataLoss (WORKER_CRASHED). The reader cannot be used after an error.
   absl::Status Feed(std::string_view bytes,
                     absl::FunctionRef<void(const worker::v1::WorkerEvent&)> on_event);
 

@@ -107,7 +107,7 @@ class DaemonWithModels : public client::Client {
 TEST(FindModel, SaysWhichModelsAnAmbiguousNameMeansInOneShortLine) {
   const std::string two(FindModel(DaemonWithModels(2), "bell").status().message());
   EXPECT_THAT(two, AllOf(HasSubstr("2 of the models: aaaaaaaaaaaa, bbbbbbbbbbbb;"),
-                         HasSubstr("MODAL_MODEL_AMBIGUOUS"), Not(HasSubstr("more"))));
+                         HasSubstr("NAME_AMBIGUOUS"), Not(HasSubstr("more"))));
   const std::string six(FindModel(DaemonWithModels(6), "bell").status().message());
   EXPECT_THAT(six, HasSubstr("dddddddddddd and 2 more;"));
   EXPECT_LT(six.size(), 200U);

@@ -196,7 +196,7 @@ TEST_F(LastingStreamTest, ARefusalEndsItForGood) {
 TEST_F(LastingStreamTest, NeedsAnIdAndHandles) {
   SceneRegistration nameless = Lathe();
   nameless.scene.clear_id();
-  EXPECT_THAT(RegisterScene(client_, nameless).status().ToString(), HasSubstr("INVALID_SCENE_ID"));
+  EXPECT_THAT(RegisterScene(client_, nameless).status().ToString(), HasSubstr("INVALID_SETTINGS"));
   SceneRegistration unnumbered = Lathe();
   unnumbered.objects[1].clear_handle();
   EXPECT_THAT(RegisterScene(client_, unnumbered).status().ToString(), HasSubstr("objects[1]"));

@@ -134,7 +134,7 @@ class CClientTest(DaemonTest):
         failed = subprocess.run([self.folder / "strike", "none.obj"], env=environment, check=False,
                                 stdin=subprocess.DEVNULL, capture_output=True, text=True)
         self.assertEqual(failed.returncode, 1)
-        self.assertIn("strike: MESH_FILE_NOT_READABLE: none.obj", failed.stderr)
+        self.assertIn("strike: FILE_NOT_FOUND: none.obj", failed.stderr)
 
     def test_what_is_probably_wrong_with_contacts_is_told(self):
         scene, stream, handle, report = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_uint32(), Report()
@@ -306,7 +306,7 @@ class CClientTest(DaemonTest):
     def test_hearings_and_frames_that_are_none_are_refused(self):
         made, hearing = ctypes.c_void_p(), Hearing(near_field=1)
         refused = self.c.carillon_create_scene(self.connection, ctypes.byref(hearing), ctypes.byref(made))
-        self.assertEqual((refused, self.c.carillon_error_reason()), (3, b"INVALID_HEARING"))
+        self.assertEqual((refused, self.c.carillon_error_reason()), (3, b"INVALID_SETTINGS"))
         refused = self.c.carillon_create_trace(str(self.folder / "x").encode(), 0.01, 7, None, ctypes.byref(made))
         self.assertEqual(refused, 3)
         self.assertIn(b"the frame is 7", self.c.carillon_error())
@@ -353,7 +353,7 @@ class CClientTest(DaemonTest):
                                                   ctypes.byref(scene))
 
         self.assertEqual(register(b"", None, None, 0), 3)
-        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SCENE_ID")
+        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")
         bar = Object(b"modalModels/" + b"0" * 64, meshes.MATERIAL.encode())
         self.assertEqual(register(b"a", None, ctypes.pointer(bar), 1), 3)
         self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")

@@ -47,7 +47,7 @@ class RecipesTest(DaemonTest):
         wrong = subprocess.run([*words, "none.obj"], cwd=self.folder, env=self.environment, check=False,
                                capture_output=True, text=True)
         self.assertNotEqual(wrong.returncode, 0)
-        self.assertIn("MESH_FILE_NOT_READABLE", wrong.stdout + wrong.stderr)
+        self.assertIn("FILE_NOT_FOUND", wrong.stdout + wrong.stderr)
 
     def test_unity(self):
         self.compile("mcs", self.save("recipe_unity.md", "csharp", "Fall.cs"))

@@ -98,7 +98,7 @@ class ListsTest(CommandLineTest):
         nobody = carillon("--server", f"unix:{self.folder}/nobody", "doctor")
         self.assertEqual(nobody.returncode, 1)
         self.assertRegex(nobody.stdout, "^FAULT +socket .* start carillond")
-        self.assertTrue(nobody.stderr.startswith("carillon: FAULTS_FOUND: "))
+        self.assertTrue(nobody.stderr.startswith("carillon: NOT_SERVING: "))
 
     def test_materials_are_listed_and_shown_with_their_source(self):
         self.assertRegex(self.run_command("material"), r"(?m)^bell_bronze +\d+ GPa +\d+ kg/m\^3$")
@@ -140,7 +140,7 @@ class VolumeTest(CommandLineTest):
         self.run_command("scene", "delete", scene)
         for words in (("--gain", "loud"), ("--gain", "-6"), ("--solo",), ("--gain",)):
             self.assertEqual(self.daemon.command("volume", *words, check=False).returncode, 2, words)
-        self.assertIn("INVALID_GAIN", self.daemon.command("volume", "--gain", "2000", check=False).stderr)
+        self.assertIn("INVALID_SETTINGS", self.daemon.command("volume", "--gain", "2000", check=False).stderr)
 
     def test_stop_says_how_many_scenes_it_silenced(self):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name

@@ -18,7 +18,7 @@ class MessagesTest(CommandLineTest):
         for words, reason in ((("stop", "99999"), "SCENE_NOT_FOUND"),
                               (("model", "create", self.folder / "bar.obj", "--young", "3"), "INVALID_MATERIAL"),
                               ((*strike, "--modes-only"), "TRANSFER_NOT_FOUND"),
-                              (("model", "list", "--page-size", "3", "--page-token", "x"), "INVALID_PAGE")):
+                              (("model", "list", "--page-size", "3", "--page-token", "x"), "INVALID_SETTINGS")):
             done = self.daemon.command(*words, check=False)
             self.assertEqual((done.returncode, done.stdout), (1, ""))
             self.assertRegex(done.stderr, f"^carillon: {reason}: .")
@@ -93,7 +93,7 @@ class LostOutputTest(CommandLineTest):
                 for stdout in (full, None):
                     code, errors = self.run_command_to(stdout, *words)
                     self.assertEqual(code, 1, words)
-                    self.assertRegex(errors, "OUTPUT_NOT_WRITABLE|FAULTS_FOUND", words)
+                    self.assertRegex(errors, "OUTPUT_NOT_WRITABLE|NOT_SERVING", words)
 
     def test_a_command_without_output_succeeds_though_stdout_is_closed(self):
         self.assertEqual(self.run_command_to(None, "model", "tag", "bar", "--add", "lost"), (0, ""))

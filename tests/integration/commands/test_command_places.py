@@ -22,7 +22,7 @@ class ModelFilesTest(CommandLineTest):
         other = done.stdout.strip()
         shown = other.removeprefix("modalModels/")[:12]
         self.assertIn(f"the label 'bar' now means 2 models: name this one {shown} and the other ", done.stderr)
-        self.assertIn("MODAL_MODEL_AMBIGUOUS: 'bar' means 2 of the models: ",
+        self.assertIn("NAME_AMBIGUOUS: 'bar' means 2 of the models: ",
                       self.daemon.command("model", "show", "bar", check=False).stderr)
         deleted = self.daemon.command("model", "delete", "nothing", shown, check=False)
         self.assertEqual((deleted.returncode, deleted.stdout), (1, f"{other} deleted\n"))

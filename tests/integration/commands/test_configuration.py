@@ -25,16 +25,16 @@ class ConfigurationTest(unittest.TestCase):
 
     def wrong_settings(self):
         """Settings that a start refuses, each with the beginning of the refusal."""
-        return (({"listen": ["foo"]}, "INVALID_ADDRESS"),
-                ({"listen": ["127.0.0.1:99999"]}, "INVALID_ADDRESS"),
+        return (({"listen": ["foo"]}, "INVALID_CONFIGURATION"),
+                ({"listen": ["127.0.0.1:99999"]}, "INVALID_CONFIGURATION"),
                 ({"listen": ["0.0.0.0:5001"]}, "TLS_REQUIRED"),
                 ({"listen": [f"unix:{self.folder}/empty"]}, "LISTEN_FAILED"),
                 ({"listen": ["127.0.0.1:0"], "tls_certificate": "/nope", "tls_key": "/nope"},
                  "TLS_UNUSABLE"),
                 ({"listen": ["127.0.0.1:5001", "unix:/tmp/a", "127.0.0.1:5001"]},
-                 "INVALID_ADDRESS: --listen names 127.0.0.1:5001 twice"),
+                 "INVALID_CONFIGURATION: --listen names 127.0.0.1:5001 twice"),
                 ({"listen": [f"unix:{self.folder}/a", f"unix:{self.folder}/b/../a"]},
-                 "INVALID_ADDRESS: --listen names unix:"),
+                 "INVALID_CONFIGURATION: --listen names unix:"),
                 ({"metrics": "no.such.host.invalid:9464"},
                  "LISTEN_FAILED: cannot serve metrics on no.such.host.invalid:9464: "),
                 # An address for documentation, which no machine has (RFC 5737).
@@ -45,11 +45,11 @@ class ConfigurationTest(unittest.TestCase):
                 ({"workers": True}, "INVALID_CONFIGURATION: workers has a value"),
                 ({"access_file": "/nope"}, "ACCESS_FILE_UNUSABLE"),
                 ({"tls_key": "/x"}, "INVALID_CONFIGURATION: --tls-certificate and --tls-key must be given together"),
-                ({"audio_device": "alsa"}, "INVALID_AUDIO_DEVICE"),
-                ({"audio_device": ""}, "INVALID_AUDIO_DEVICE"),
-                ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_AUDIO_DEVICE"),
-                ({"audio_device": f"file:{self.folder}/no/a.wav"}, "AUDIO_FILE_FAILED: cannot write"),
-                ({"audio_device": f"file:{self.folder}"}, "AUDIO_FILE_FAILED: cannot write"),
+                ({"audio_device": "alsa"}, "INVALID_CONFIGURATION"),
+                ({"audio_device": ""}, "INVALID_CONFIGURATION"),
+                ({"audio_device": "file:/proc/self/mountinfo"}, "INVALID_CONFIGURATION"),
+                ({"audio_device": f"file:{self.folder}/no/a.wav"}, "OUTPUT_NOT_WRITABLE: cannot write"),
+                ({"audio_device": f"file:{self.folder}"}, "OUTPUT_NOT_WRITABLE: cannot write"),
                 ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
                 ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
                 ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
@@ -85,7 +85,7 @@ class ConfigurationTest(unittest.TestCase):
     def test_a_flag_that_overrides_the_file_is_not_blamed_on_the_file(self):
         refused = self.run_daemon({"listen": [f"unix:{self.folder}/a"]}, "--check-config", "--listen", "foo")
         self.assertEqual(refused.returncode, 2)
-        self.assertRegex(refused.stderr, 'error: INVALID_ADDRESS: "?foo')
+        self.assertRegex(refused.stderr, 'error: INVALID_CONFIGURATION: "?foo')
 
     def test_a_database_that_this_user_may_not_write_is_found_by_the_check(self):
         self.assertEqual(self.run_daemon({}, "db", "check").returncode, 1)  # there is none yet
@@ -103,7 +103,7 @@ class ConfigurationTest(unittest.TestCase):
             started = self.run_daemon({"metrics": metrics})
         self.assertEqual(checked.returncode, 0, checked.stderr)
         self.assertEqual(started.returncode, 1)
-        self.assertIn(f"error: ADDRESS_IN_USE: cannot serve metrics on {metrics}: Address already in use; let "
+        self.assertIn(f"error: LISTEN_FAILED: cannot serve metrics on {metrics}: Address already in use; let "
                       "--metrics", started.stderr)
 
 

@@ -108,12 +108,12 @@ TEST_P(DeformationModesTest, BodyInTwoPiecesIsRefused) {
   for (const Point& p : mesh.nodes) twice.nodes.push_back({p[0] + 5, p[1], p[2]});
   for (const int32_t node : mesh.elements) twice.elements.push_back(node + offset);
   EXPECT_THAT(Solve(twice, 3).status().ToString(),
-              HasSubstr("BODY_IN_SEVERAL_PIECES: the body can move in 12 ways without bending"));
+              HasSubstr("MESH_SEVERAL_PIECES: the body can move in 12 ways without bending"));
 }
 
 TEST_P(DeformationModesTest, PiecesThatHangTogetherByAnEdgeAreRefused) {
   EXPECT_THAT(Solve(TwoBoxesOnAnEdge({1, 0.6, 0.3}, GetParam()), 3).status().ToString(),
-              HasSubstr("BODY_IN_SEVERAL_PIECES: the body can move in 7 ways without bending"));
+              HasSubstr("MESH_SEVERAL_PIECES: the body can move in 7 ways without bending"));
 }
 
 // The first is solved dense, the second sparse.

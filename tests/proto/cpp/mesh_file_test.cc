@@ -73,8 +73,8 @@ TEST_F(MeshFile, ABufferOutsideTheFolderIsRefused) {
 
 TEST_F(MeshFile, AMissingBufferIsNamed) {
   EXPECT_THAT(ReadGltf(Gltf("data/body.bin")),
-              AllOf(HasSubstr("MESH_FILE_NOT_READABLE: "),
-                    HasSubstr((folder_ / "data/body.bin").string()), HasSubstr("No such file")));
+              AllOf(HasSubstr("FILE_NOT_FOUND: "), HasSubstr((folder_ / "data/body.bin").string()),
+                    HasSubstr("No such file")));
 }
 
 TEST_F(MeshFile, OnlyAFileNamedGltfBringsOthers) {
@@ -94,7 +94,7 @@ TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOne) {
 
 TEST_F(MeshFile, WhatIsNoFileOrEmptyIsRefused) {
   EXPECT_THAT(ReadMeshFile(folder_.string(), "obj").status().ToString(),
-              AllOf(HasSubstr("MESH_FILE_NOT_READABLE: "), HasSubstr("Is a directory")));
+              AllOf(HasSubstr("FILE_NOT_FOUND: "), HasSubstr("Is a directory")));
   EXPECT_THAT(ReadMeshFile(Write("empty.obj", ""), "obj").status().ToString(),
               HasSubstr("MESH_EMPTY: "));
 }

@@ -271,7 +271,7 @@ TEST_F(AudioApi, TheNumberOfListenersIsLimited) {
   grpc::ClientContext context;
   const auto refused = audio->Listen(&context, {});
   EXPECT_FALSE(refused->Read(&response));
-  ExpectRefused(refused->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_LISTENERS");
+  ExpectRefused(refused->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS");
   for (const auto& one : contexts) one->TryCancel();
 }
 
@@ -352,7 +352,7 @@ TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
   ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   requests = good;
   requests[1].mutable_record()->mutable_header()->mutable_hearing()->set_reference_distance_m(-1);
-  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_HEARING");
+  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   requests = good;
   requests[2].mutable_record()->mutable_object()->mutable_pose()->mutable_orientation()->set_w(2);
   ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_POSE");
@@ -387,7 +387,7 @@ TEST_F(AudioApi, TheMixerSaysHowItPlays) {
 
 TEST_F(AudioApi, ASecondDaemonOnTheSameSocketIsRefused) {
   EXPECT_THAT(PrepareSocket(address().substr(5)).status().ToString(),
-              testing::HasSubstr("ADDRESS_IN_USE: "));
+              testing::HasSubstr("LISTEN_FAILED: "));
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ TEST_F(JobRunApi, OnlyTheTokenOfThatJobOpensIt) {
 TEST_F(JobRunApi, ATokenBringsOneResult) {
   EXPECT_TRUE(Upload(token, records.size()).ok());
   const std::vector<std::string> files = Files();
-  ExpectRefused(Upload(token, records.size()), grpc::FAILED_PRECONDITION, "JOB_TOKEN_USED");
+  ExpectRefused(Upload(token, records.size()), grpc::FAILED_PRECONDITION, "JOB_TOKEN_EXPIRED");
   EXPECT_THAT(Files(), testing::UnorderedElementsAreArray(files));
 }
 

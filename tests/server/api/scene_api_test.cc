@@ -59,7 +59,7 @@ TEST_F(SceneApi, AnObjectStatesWhereItIsOnceItWasTold) {
   EXPECT_EQ(updated.object().pose().position_m().z(), -3);
   EXPECT_EQ(updated.object().pose().orientation().w(), 1);
   request.set_glide_s(-1);
-  ExpectRefused(Update(request, updated), grpc::INVALID_ARGUMENT, "INVALID_GLIDE");
+  ExpectRefused(Update(request, updated), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   v1::AddObjectsRequest nowhere = SmallObject(scene);
   nowhere.mutable_objects(0)->mutable_pose()->mutable_position_m()->set_x(1e7);
   ExpectRefused(Add(nowhere, added), grpc::INVALID_ARGUMENT, "INVALID_POSE");
@@ -203,7 +203,7 @@ TEST_F(SceneApi, AnObjectThatCannotSoundIsRefusedWithItsReason) {
   ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
   request = good;
   request.mutable_objects(0)->set_size(-1);
-  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_OBJECT");
+  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   request = good;
   request.mutable_objects(0)->mutable_material()->set_poisson_ratio(0.2);
   ExpectRefused(Add(request, response), grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");

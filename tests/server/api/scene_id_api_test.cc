@@ -125,7 +125,7 @@ TEST_F(SceneIdApi, AnIdHasTheStatedForm) {
   for (const std::string& id : {std::string("1"), std::string("-a"), std::string("A"),
                                 std::string("a/b"), std::string("a b"), std::string("\xc3\xa4"),
                                 std::string("a\0b", 3), std::string("a\n"), std::string(65, 'z')}) {
-    ExpectRefused(Create(Wanted(id)), grpc::INVALID_ARGUMENT, "INVALID_SCENE_ID");
+    ExpectRefused(Create(Wanted(id)), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   }
 }
 
@@ -265,7 +265,7 @@ TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
   ExpectRefusedAt(request, grpc::ALREADY_EXISTS, "OBJECT_EXISTS", "3");
   request = Objects({1, 2, 3});
   request.mutable_objects(2)->set_size(-1);
-  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_OBJECT", "2");
+  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS", "2");
   request = Objects({1, 2, 3});
   request.mutable_objects(1)->set_modal_model("modalModels/none");
   ExpectRefusedAt(request, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND", "1");
@@ -279,7 +279,7 @@ TEST_F(AddObjectsApi, AloneIsRefusedWithoutAPlace) {
   v1::AddObjectsRequest request = Objects({1});
   request.mutable_objects(0)->set_size(-1);
   const grpc::Status status = AddAll(request);
-  ExpectRefused(status, grpc::INVALID_ARGUMENT, "INVALID_OBJECT");
+  ExpectRefused(status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
   EXPECT_EQ(ErrorOf(status).metadata().count("index"), 0U);
 }
 

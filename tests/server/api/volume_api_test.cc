@@ -148,17 +148,17 @@ TEST_F(VolumeApi, GainsOutOfRangeAreRefused) {
     change.set_gain(gain);
     v1::UpdateSceneResponse changed;
     ExpectRefused(Call(*scenes, &v1::SceneService::Stub::UpdateScene, change, changed), kInvalid,
-                  "INVALID_GAIN");
+                  "INVALID_SETTINGS");
     v1::CreateSceneRequest create;
     create.set_gain(gain);
     v1::CreateSceneResponse created;
     ExpectRefused(Call(*scenes, &v1::SceneService::Stub::CreateScene, create, created), kInvalid,
-                  "INVALID_GAIN");
+                  "INVALID_SETTINGS");
     v1::UpdateMixerRequest mixer;
     mixer.set_gain(gain);
     v1::UpdateMixerResponse mixed;
     ExpectRefused(Call(*audio, &v1::AudioService::Stub::UpdateMixer, mixer, mixed), kInvalid,
-                  "INVALID_GAIN");
+                  "INVALID_SETTINGS");
   }
 }
 

@@ -84,7 +84,7 @@ TEST_F(BlockBroadcastTest, TheLimitIsOnThoseThatListenNow) {
   for (size_t i = 0; i < BlockBroadcast::kMaxListenerCount; ++i) listeners.push_back(Listen());
   const absl::Status refused = broadcast_.Subscribe([] {}).status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_THAT(refused.ToString(), testing::HasSubstr("TOO_MANY_LISTENERS: "));
+  EXPECT_THAT(refused.ToString(), testing::HasSubstr("TOO_MANY_CALLS: "));
   listeners.pop_back();
   EXPECT_TRUE(broadcast_.Subscribe([] {}).ok());
 }

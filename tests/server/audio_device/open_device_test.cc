@@ -81,7 +81,7 @@ TEST(OpenDevice, FileDeviceWritesTheSamplesBitForBit) {
 TEST(OpenDevice, RefusesAFileThatCannotBeWritten) {
   ManualClock clock;
   const absl::Status status = Open("file:/nonexistent/folder/out.wav", clock).status();
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("AUDIO_FILE_FAILED: "));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 TEST(OpenDevice, KeepsAFileThatIsNoSound) {
@@ -89,7 +89,7 @@ TEST(OpenDevice, KeepsAFileThatIsNoSound) {
   const std::string path = testing::TempDir() + "KeepsAFileThatIsNoSound.db";
   std::ofstream(path) << "SQLite format 3";
   const absl::Status status = Open("file:" + path, clock).status();
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_AUDIO_DEVICE: \"" + path));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_CONFIGURATION: \"" + path));
   EXPECT_EQ(std::filesystem::file_size(path), 15U);
   std::filesystem::remove(path);
 }
@@ -99,7 +99,7 @@ TEST(OpenDevice, RefusesWhatNamesNoDevice) {
   for (const char* specification : {"", "speaker", "file:", "nullish"}) {
     const absl::Status status = Open(specification, clock).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << specification;
-    EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_AUDIO_DEVICE: "));
+    EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_CONFIGURATION: "));
   }
 }
 

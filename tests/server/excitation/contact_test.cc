@@ -33,7 +33,7 @@ TEST(Contact, AnImpulseMustBeFinite) {
   for (const double bad : {kNan, kInfinity, -kInfinity, 4e38, -1e300}) {
     ContactImpulse contact = MakeContact();
     contact.impulse_newton_seconds[1] = bad;
-    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("IMPULSE_NOT_FINITE"));
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("CONTACT_MALFORMED"));
     EXPECT_THAT(Validate(contact).ToString(), HasSubstr(absl::StrCat(", ", bad, ", ")));
   }
 }
@@ -42,21 +42,21 @@ TEST(Contact, ItsPointMustBeFinite) {
   ContactImpulse contact = MakeContact();
   contact.location = Point{0, kNan, 0};
   EXPECT_THAT(Validate(contact).ToString(),
-              HasSubstr("POINT_NOT_FINITE: the point of contact 0, nan, 0 "));
+              HasSubstr("CONTACT_MALFORMED: the point of contact 0, nan, 0 "));
 }
 
 TEST(Contact, ItsDurationLiesFromZeroToATenthOfASecond) {
   for (const double bad : {-1e-9, 0.1001, kNan, kInfinity}) {
     ContactImpulse contact = MakeContact();
     contact.duration_s = bad;
-    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("INVALID_DURATION")) << bad;
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("CONTACT_MALFORMED")) << bad;
   }
 }
 
 TEST(Contact, BarycentricWeightsAreNotNegativeAndSumToOne) {
   for (const std::array<double, 3>& bad :
        {std::array{0.5, 0.6, -0.1}, std::array{0.3, 0.3, 0.3}, std::array{kNan, 0.5, 0.5}}) {
-    EXPECT_THAT(ValidateWeights(bad).ToString(), HasSubstr("INVALID_WEIGHTS"));
+    EXPECT_THAT(ValidateWeights(bad).ToString(), HasSubstr("CONTACT_MALFORMED"));
   }
   EXPECT_TRUE(ValidateWeights({float{1} / 3, float{1} / 3, 1 - 2 * (float{1} / 3)}).ok());
 }
@@ -71,7 +71,7 @@ TEST(Contact, TheFiguresOfAnElasticCollisionAreAboveZeroWhereTheyAreKnown) {
     for (const double bad : {0.0, -1.0, kNan, kInfinity}) {
       ContactImpulse wrong = contact;
       wrong.hertz.*figure = bad;
-      EXPECT_THAT(Validate(wrong).ToString(), HasSubstr("INVALID_HERTZ_CONTACT")) << bad;
+      EXPECT_THAT(Validate(wrong).ToString(), HasSubstr("CONTACT_MALFORMED")) << bad;
       wrong.hertz.*figure = 0.3;
       EXPECT_TRUE(Validate(wrong).ok());
     }
@@ -83,7 +83,7 @@ TEST(Contact, ARoughnessHasADepthAGrainAndASpeed) {
   for (const Roughness& bad :
        {Roughness{.travel_speed_m_per_s = -1}, Roughness{.depth = 11}, Roughness{.depth = kNan},
         Roughness{.irregularity_length_m = 0}, Roughness{.travel_speed_m_per_s = kInfinity}}) {
-    EXPECT_THAT(Validate(bad).ToString(), HasSubstr("INVALID_ROUGHNESS"));
+    EXPECT_THAT(Validate(bad).ToString(), HasSubstr("CONTACT_MALFORMED"));
   }
 }
 

@@ -153,19 +153,20 @@ TEST(SurfaceLocator, AnswersSeveralThreadsAtOnce) {
 TEST(SurfaceLocator, SaysWhyAContactCannotBeLocated) {
   const Tube tube;
   const auto locator = SurfaceLocator::Make(tube.surfaces()).value();
-  EXPECT_THAT(locator->Nearest({NAN, 0, 0}).status().ToString(), HasSubstr("POINT_NOT_FINITE"));
-  EXPECT_THAT(locator->Nearest({1e300, 0, 0}).status().ToString(), HasSubstr("POINT_TOO_FAR"));
+  EXPECT_THAT(locator->Nearest({NAN, 0, 0}).status().ToString(), HasSubstr("CONTACT_MALFORMED"));
+  EXPECT_THAT(locator->Nearest({1e300, 0, 0}).status().ToString(), HasSubstr("CONTACT_MALFORMED"));
   EXPECT_THAT(locator->OnGivenTriangle({48, {1, 0, 0}}).status().ToString(),
-              HasSubstr("TRIANGLE_OUT_OF_RANGE"));
+              HasSubstr("CONTACT_MALFORMED"));
   EXPECT_THAT(locator->OnGivenTriangle({0, {1, 1, 0}}).status().ToString(),
-              HasSubstr("INVALID_WEIGHTS"));
+              HasSubstr("CONTACT_MALFORMED"));
 }
 
 TEST(SurfaceLocator, RefusesASurfaceWithoutTrianglesOrWithABadIndex) {
   Tube tube;
   LocatorSurfaces surfaces = tube.surfaces();
   surfaces.triangles = {};
-  EXPECT_THAT(SurfaceLocator::Make(surfaces).status().ToString(), HasSubstr("SURFACE_MALFORMED"));
+  EXPECT_THAT(SurfaceLocator::Make(surfaces).status().ToString(),
+              HasSubstr("MODAL_MODEL_MALFORMED"));
   tube.triangles[3][1] = static_cast<uint32_t>(tube.vertices.size());
   EXPECT_THAT(SurfaceLocator::Make(tube.surfaces()).status().ToString(),
               HasSubstr("triangle 3 of the sounding surface"));

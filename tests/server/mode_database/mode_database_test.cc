@@ -273,7 +273,8 @@ TEST_F(ModeDatabaseTest, PagesListEveryModelOnceNewestFirst) {
     token = page->next_page_token;
   } while (!token.empty());
   EXPECT_EQ(listed, newest_first);
-  EXPECT_THAT(database_->models().List({}, 2, "x").status().ToString(), HasSubstr("INVALID_PAGE"));
+  EXPECT_THAT(database_->models().List({}, 2, "x").status().ToString(),
+              HasSubstr("INVALID_SETTINGS"));
 }
 
 TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
@@ -298,7 +299,7 @@ TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
   ASSERT_TRUE(database_->models().Update(b_, {.remove_tags = {"fragile", "none"}}).ok());
   EXPECT_EQ(listed({.tag = "fragile"}), "");
   EXPECT_THAT(database_->models().Update(b_, {.add_tags = {"two words"}}).status().ToString(),
-              HasSubstr("INVALID_TAG"));
+              HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(database_->models().Update(Sha256Hex("c"), {}).status().ToString(),
               HasSubstr("MODAL_MODEL_NOT_FOUND"));
 }

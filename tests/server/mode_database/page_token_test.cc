@@ -34,13 +34,13 @@ TEST(PageToken, TheTokenOfAnotherListAndAnyOtherTextAreRefused) {
         "jobs-05", "jobs-5 ", "jobs-5x", "jobs-9223372036854775808", "Jobs-5"}) {
     EXPECT_THAT(
         ParsePage("jobs", 0, token).status().ToString(),
-        HasSubstr("INVALID_PAGE: page_token is not one of an earlier answer that listed jobs"))
+        HasSubstr("INVALID_SETTINGS: page_token is not one of an earlier answer that listed jobs"))
         << token;
   }
 }
 
 TEST(PageToken, ANegativeSizeIsRefused) {
-  EXPECT_THAT(ParsePage("jobs", -1, "").status().ToString(), HasSubstr("INVALID_PAGE"));
+  EXPECT_THAT(ParsePage("jobs", -1, "").status().ToString(), HasSubstr("INVALID_SETTINGS"));
 }
 
 }  // namespace

@@ -71,20 +71,19 @@ std::vector<Report> Reports() {
   std::vector<Report> reports = {
       Struck(SmallImpulse(1)),
       Struck(SmallImpulse(9), "OBJECT_NOT_FOUND"),
-      Struck(SmallImpulse(9, kNan, -1), "INVALID_TIME_OFFSET"),
-      Struck(SmallImpulse(1, kNan), "IMPULSE_NOT_FINITE"),
-      Struck(SmallImpulse(1, 1, kNan), "INVALID_TIME_OFFSET"),
+      Struck(SmallImpulse(9, kNan, -1), "CONTACT_MALFORMED"),
+      Struck(SmallImpulse(1, kNan), "CONTACT_MALFORMED"),
+      Struck(SmallImpulse(1, 1, kNan), "CONTACT_MALFORMED"),
       Struck(SmallImpulse(1, 1, 1e5), "TIME_TOO_FAR_AHEAD"),
       Spoilt(
           [](auto& it) {
             it.contact.impulse.location = Point{kNan, 0, 0};
           },
-          "POINT_NOT_FINITE"),
+          "CONTACT_MALFORMED"),
       Spoilt([](auto& it) { it.contact.impulse.location = SurfacePoint{.triangle = 4}; },
-             "TRIANGLE_OUT_OF_RANGE"),
-      Spoilt([](auto& it) { it.contact.impulse.duration_s = 0.2; }, "INVALID_DURATION"),
-      Spoilt([](auto& it) { it.contact.impulse.hertz.reduced_mass_kg = 0; },
-             "INVALID_HERTZ_CONTACT"),
+             "CONTACT_MALFORMED"),
+      Spoilt([](auto& it) { it.contact.impulse.duration_s = 0.2; }, "CONTACT_MALFORMED"),
+      Spoilt([](auto& it) { it.contact.impulse.hertz.reduced_mass_kg = 0; }, "CONTACT_MALFORMED"),
       Spoilt([&](auto& it) { it.contact.second = second; }, ""),
       Spoilt([](auto& it) { it.contact.second = {.handle = 9, .location = Point{}}; },
              "OBJECT_NOT_FOUND", 2),
@@ -96,9 +95,9 @@ std::vector<Report> Reports() {
           },
           "INVALID_POSE", 2),
       Held({}),
-      Held({.depth = 11}, "INVALID_ROUGHNESS"),
+      Held({.depth = 11}, "CONTACT_MALFORMED"),
       Touched(SmallImpulse(1).contact, {}),
-      Touched(SmallImpulse(9).contact, {.depth = -1}, "INVALID_ROUGHNESS"),
+      Touched(SmallImpulse(9).contact, {.depth = -1}, "CONTACT_MALFORMED"),
       Touched(SmallImpulse(9).contact, {}, "OBJECT_NOT_FOUND"),
       Moved(1, {.position_m = {1, 2, 3}}),
       Moved(9, {}, "OBJECT_NOT_FOUND"),
@@ -396,7 +395,7 @@ TEST_F(ReadingTest, WhatIsStrangeAboutContactsIsCountedAndWhatNoBodyBearsIsRefus
   intake.Hold({.contact = SmallImpulse(1, 1e20).contact});
   intake.Touch({.contact = SmallImpulse(1, 1e20).contact});
   intake.Touch({.contact = SmallImpulse(1).contact, .time_offset_s = -1});
-  EXPECT_THAT(intake.last_rejection().ToString(), HasSubstr("INVALID_TIME_OFFSET: "));
+  EXPECT_THAT(intake.last_rejection().ToString(), HasSubstr("CONTACT_MALFORMED: "));
   intake.Touch({.contact = SmallImpulse(1).contact, .time_offset_s = 0.003});
   intake.EndStep();
   const IntakeFindings findings = intake.findings();

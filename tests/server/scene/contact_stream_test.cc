@@ -266,12 +266,12 @@ TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndThe
   endless.contact.impulse.duration_s = 0.2;
   const std::vector<std::pair<ObjectImpulse, const char*>> cases = {
       {SmallImpulse(9), "OBJECT_NOT_FOUND: "},
-      {SmallImpulse(1, nan), "IMPULSE_NOT_FINITE: "},
-      {off_surface, "TRIANGLE_OUT_OF_RANGE: "},
-      {nowhere, "POINT_NOT_FINITE: "},
-      {endless, "INVALID_DURATION: "},
-      {SmallImpulse(1, 1, -0.001), "INVALID_TIME_OFFSET: "},
-      {SmallImpulse(1, 1, nan), "INVALID_TIME_OFFSET: "},
+      {SmallImpulse(1, nan), "CONTACT_MALFORMED: "},
+      {off_surface, "CONTACT_MALFORMED: "},
+      {nowhere, "CONTACT_MALFORMED: "},
+      {endless, "CONTACT_MALFORMED: "},
+      {SmallImpulse(1, 1, -0.001), "CONTACT_MALFORMED: "},
+      {SmallImpulse(1, 1, nan), "CONTACT_MALFORMED: "},
       {SmallImpulse(1, 1, 61), "TIME_TOO_FAR_AHEAD: "},
   };
   for (const auto& [impulse, reason] : cases) {

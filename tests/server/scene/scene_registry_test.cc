@@ -105,7 +105,7 @@ TEST(SceneRegistry, RefusesSizesAndGainsOutOfRange) {
     const absl::Status status =
         stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << size << " " << gain;
-    EXPECT_THAT(status.ToString(), HasSubstr("INVALID_OBJECT: "));
+    EXPECT_THAT(status.ToString(), HasSubstr("INVALID_SETTINGS: "));
   }
 }
 
@@ -121,12 +121,12 @@ TEST(SceneRegistry, RefusesShapesAndCouplingsThatNoBodyOfTheSizeHas) {
   ModalModel model = *SmallModel();
   for (const float shape : {1.01F * most, -3e38F, std::numeric_limits<float>::infinity()}) {
     model.shapes[5] = shape;
-    EXPECT_THAT(add(model).ToString(), HasSubstr("SHAPES_NOT_PHYSICAL: ")) << shape;
+    EXPECT_THAT(add(model).ToString(), HasSubstr("MODAL_MODEL_MALFORMED: ")) << shape;
   }
   model.shapes[5] = 0.99F * most;
   EXPECT_TRUE(add(model).ok());
   model.couplings[1] = 1e300;
-  EXPECT_THAT(add(model).ToString(), HasSubstr("SHAPES_NOT_PHYSICAL: "));
+  EXPECT_THAT(add(model).ToString(), HasSubstr("MODAL_MODEL_MALFORMED: "));
 }
 
 TEST(SceneRegistry, HandlesAreTheClientsOrTheLowestThatIsFree) {
@@ -348,15 +348,15 @@ TEST(SceneRegistry, RefusesPosesGlidesAndHearingsOutOfRange) {
     return stage.scenes.UpdateObject(stage.scene, handle, change).status().ToString();
   };
   EXPECT_THAT(update(nowhere), HasSubstr("INVALID_POSE"));
-  EXPECT_THAT(update(slow), HasSubstr("INVALID_GLIDE"));
+  EXPECT_THAT(update(slow), HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {}, -1).ToString(),
-              HasSubstr("INVALID_GLIDE"));
+              HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {.orientation = {.w = 3}}, 0).ToString(),
               HasSubstr("INVALID_POSE"));
   HearingSettings hearing;
   hearing.sound_speed_m_per_s = 0;
   EXPECT_THAT(stage.scenes.CreateScene({.hearing = hearing, .listener = {}}).status().ToString(),
-              HasSubstr("INVALID_HEARING"));
+              HasSubstr("INVALID_SETTINGS"));
 }
 
 TEST(SceneRegistry, ARemovedObjectFadesOut) {

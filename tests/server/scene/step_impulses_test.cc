@@ -115,7 +115,7 @@ TEST_F(StepImpulsesTest, ABadImpulseIsRefusedAndAddsNothing) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Point point{0.01, 0.02, 0};
   auto events = Strike({ImpulseAt(point, {1, 2, 3}), ImpulseAt(point, {kNan, 0, 0})});
-  EXPECT_THAT(rejection_.ToString(), HasSubstr("IMPULSE_NOT_FINITE: "));
+  EXPECT_THAT(rejection_.ToString(), HasSubstr("CONTACT_MALFORMED: "));
   ASSERT_EQ(events.size(), 1U);
   EXPECT_EQ(events[0].impulse()->impulse_newton_seconds[0], 1);
   events = Strike({ImpulseAt(point, {1, 2, 3}), ImpulseAt(point, {1e8, 0, 0})});

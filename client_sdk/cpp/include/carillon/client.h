@@ -252,7 +252,7 @@ class Client {
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 
   /// Deletes the models that sounded least recently until the others fit into the request's budget.
-  /// Further errors: INVALID_ARGUMENT (INVALID_BUDGET).
+  /// Further errors: INVALID_ARGUMENT (INVALID_SETTINGS).
   virtual absl::StatusOr<v1::CollectGarbageResponse> CollectGarbage(
       const v1::CollectGarbageRequest& request) const;
 

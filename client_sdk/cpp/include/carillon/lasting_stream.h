@@ -23,7 +23,7 @@ struct SceneRegistration {
 /// Makes a scene with its objects and returns its name. If the scene exists, objects of it that
 /// have a wanted handle stay as they are, and the missing ones are added, so that the call may be
 /// repeated after a lost connection or a restart of the daemon. Errors: INVALID_ARGUMENT
-/// (INVALID_SCENE_ID: no id, INVALID_SETTINGS: an object without a handle), ALREADY_EXISTS
+/// (INVALID_SETTINGS: no id, or an object without a handle), ALREADY_EXISTS
 /// (OBJECT_EXISTS: an object of the scene has the handle and another model), and those of
 /// SceneService.CreateScene and AddObjects.
 absl::StatusOr<std::string> RegisterScene(const Client& client,

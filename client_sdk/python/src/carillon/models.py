@@ -256,7 +256,7 @@ async def find(connection: Connection, text: str) -> modal_model_service_pb2.Mod
     if len(found) == 1:
         return await get(connection, found[0])
     if found:
-        raise errors.CarillonError("MODAL_MODEL_AMBIGUOUS", f"'{text}' means {len(found)} of the models, for instance "
+        raise errors.CarillonError("NAME_AMBIGUOUS", f"'{text}' means {len(found)} of the models, for instance "
                                    f"{found[0]} and {found[1]}; give more digits of the digest")
     hint = checks.suggestion(text, labels - {""})
     raise errors.CarillonError("MODAL_MODEL_NOT_FOUND", f"no model has the label '{text}' or begins with these "

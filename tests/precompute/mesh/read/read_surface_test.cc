@@ -131,7 +131,7 @@ TEST_F(ReadSurfaceTest, PointsAndLinesAreNoTriangles) {
 
 TEST_F(ReadSurfaceTest, AMissingFileIsRefused) {
   EXPECT_THAT(ReadMesh("/nonexistent/mesh.obj", "obj", 1).status().ToString(),
-              HasSubstr("NOT_FOUND: MESH_FILE_NOT_READABLE: /nonexistent/mesh.obj"));
+              HasSubstr("NOT_FOUND: FILE_NOT_FOUND: /nonexistent/mesh.obj"));
 }
 
 TEST_F(ReadSurfaceTest, AnUnknownFormatIsRefused) {

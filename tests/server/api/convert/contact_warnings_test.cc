@@ -59,7 +59,7 @@ TEST(ContactWarnings, EachFactHasAWarningWithItsCountAndFigures) {
   report.set_dropped_count(3);
   report.set_rejected_count(1);
   report.set_ahead_s(0.28);
-  report.mutable_last_rejection()->set_reason("POINT_NOT_FINITE");
+  report.mutable_last_rejection()->set_reason("CONTACT_MALFORMED");
   const IntakeFindings findings{.engine = {.blow_count = 1, .changed_partner_count = 11},
                                 .distant_point_count = 5,
                                 .largest_distance_m = 0.5,

@@ -336,7 +336,7 @@ TEST_F(ConnectionGateTest, RefusesAPortThatIsInUse) {
   Open(1);
   ConnectionGate second(1);
   const absl::Status status = second.Listen(address_, std::make_unique<Keeper>(taken_));
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("ADDRESS_IN_USE: "));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("LISTEN_FAILED: "));
 }
 
 TEST_F(ConnectionGateTest, AUnixSocketIsItsOwnersUnlessOnlyAGroupMayEnterItsFolder) {

@@ -353,7 +353,7 @@ TEST_F(LocalExecutorTest, KillsAWorkerThatLivesButNeverEnds) {
 TEST_F(LocalExecutorTest, KillsAWorkerThatWritesGarbage) {
   const Outcome outcome = RunScript(R"(printf '\377\377\377\377\377\377' >&3; sleep 1000)");
   EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_EQ(outcome.error.reason(), "WORKER_GARBAGE");
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
 }
 
 TEST_F(LocalExecutorTest, KillsAWorkerThatFloodsItsPipe) {
@@ -362,7 +362,7 @@ TEST_F(LocalExecutorTest, KillsAWorkerThatFloodsItsPipe) {
   WriteEvents(events);
   const Outcome outcome = RunScript("while :; do cat \"$here/events\" >&3; done");
   EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_EQ(outcome.error.reason(), "WORKER_GARBAGE");
+  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
 }
 
 TEST_F(LocalExecutorTest, CancelsARunningWorker) {
