@@ -169,8 +169,20 @@ void AddStrike(CLI::App& app, Program& program) {
                                 "The time to ring, s [until the sound has decayed by 60 dB]"),
              0.001, 1e9, "leave --seconds out to hear the sound until it has decayed");
   AddMaterial(strike, options->material);
+  CLI::Option* const out =
+      strike
+          .add_option("--out", options->out,
+                      "Write a WAV file, as `carillon render` does, and play nothing")
+          ->check([](const std::string& path) {
+            return WhyNotWritten(path, {".wav", ".wave"});
+          });
+  strike
+      .add_flag("--normalize", options->normalize,
+                "Scale the sound of the file to a peak of 0.9 of full scale")
+      ->needs(out);
   strike.callback([&program, options] {
     CheckImpulse(options->impulse_newton_seconds);
+    CheckJson(program, options->out);
     program.command = [&program, options] {
       const StopSignal stop;
       return Strike(*program.Daemon(), *options, stop, program.json);
@@ -259,6 +271,7 @@ void AddCommands(CLI::App& app, Program& program) {
   AddTransfer(app, program);
   AddJob(app, program);
   AddMaterials(app, program);
+  AddExplain(app, program);
   AddScenes(app, program);
   AddStrike(app, program);
   AddListen(app, program);
@@ -339,7 +352,7 @@ int Main(int argc, char** argv) {
               << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
     return kUsage;
   }
-  return Finish(Report(program.command()));
+  return Finish(Report(program.command(), program.json));
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/file_digest.h"
-#include "proto/cpp/error_reason.h"
+#include "client_sdk/cli/output/output.h"
 
 namespace carillon::cli {
 namespace {
@@ -45,13 +48,20 @@ Json BlowJson(const v1::Blow& blow) {
 
 Json SoundJson(const ClipRecord& record) {
   const v1::RenderSummary& summary = record.summary;
-  Json json = {{"frame_count", summary.frame_count()},
+  Json json = {{"frame_count", record.frame_count},
+               {"seconds", static_cast<double>(record.frame_count) / record.sample_rate_hz},
+               {"cut", record.is_cut},
                {"peak_pa", summary.peak_pa()},
                {"pa_per_sample", summary.full_scale_pa() / record.factor},
                {"limited_frame_count", summary.limited_frame_count()},
                {"rejected_count", summary.rejected_count()},
                {"load_count", summary.findings().load_count()}};
   if (summary.has_integrated_lufs()) json["integrated_lufs"] = summary.integrated_lufs();
+  json["paper_coupling_object_count"] = summary.paper_coupling_object_count();
+  json["warnings"] = Json::array();
+  for (const v1::Warning& warning : summary.warnings()) {
+    json["warnings"].push_back(Json::parse(MessageJson(warning)));
+  }
   return json;
 }
 
@@ -81,6 +91,8 @@ std::string SettingsText(const RenderOptions& options, const std::string& daemon
                {"stems", options.stems},
                {"carillon", daemon_version}};
   if (options.full_scale_pa) json["full_scale_pa"] = *options.full_scale_pa;
+  if (options.length_s) json["length_s"] = *options.length_s;
+  if (options.length_s) json["fade_s"] = options.fade_s;
   return json.dump();
 }
 
@@ -103,9 +115,41 @@ std::string RecordLine(const ClipRecord& record) {
 }
 
 std::string ErrorLine(const std::string& clip, const absl::Status& error) {
-  const v1::ErrorInfo info = ToErrorInfo(error);
-  return LineOf(
-      {{"clip", clip}, {"error", {{"reason", info.reason()}, {"message", info.message()}}}});
+  Json json = {{"clip", clip}};
+  json.update(Json::parse(ErrorJson(error)));
+  return LineOf(json);
+}
+
+ClipTotals TotalsOf(const std::filesystem::path& manifest) {
+  ClipTotals totals;
+  std::map<std::string, std::pair<uint64_t, std::string>> warnings;  // count, and an instance
+  std::ifstream lines(manifest);
+  for (std::string line; std::getline(lines, line);) {
+    const Json record = Json::parse(line, nullptr, false);
+    if (!record.is_object() || record.contains("error")) continue;
+    const std::string clip = record.value("clip", "");
+    const uint64_t frames = record.value("frame_count", uint64_t{0});
+    const uint64_t limited = record.value("limited_frame_count", uint64_t{0});
+    ++totals.clip_count;
+    totals.frame_count += frames;
+    totals.limited_frame_count += limited;
+    totals.peak_pa = std::max(totals.peak_pa, record.value("peak_pa", 0.0));
+    if (limited > 0) {
+      totals.limited_clips.push_back(
+          {clip, static_cast<double>(limited) / static_cast<double>(frames)});
+    }
+    for (const Json& warning : record.value("warnings", Json::array())) {
+      auto& [count, instance] = warnings[warning.at("id")];
+      if (count++ == 0) instance = absl::StrCat(clip, ": ", warning.value("text", ""));
+    }
+  }
+  std::ranges::stable_sort(totals.limited_clips, std::ranges::greater(),
+                           &ClipTotals::LimitedClip::share);
+  for (const auto& [id, found] : warnings) {
+    totals.warnings.push_back(
+        absl::StrCat(id, " in ", Counted(found.first, "clip"), ", for instance in ", found.second));
+  }
+  return totals;
 }
 
 bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted) {

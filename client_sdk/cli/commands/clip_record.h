@@ -25,7 +25,10 @@ struct ClipRecord {
   std::string trace_digest;  ///< SHA-256, hexadecimal
   std::string settings;      ///< SettingsText
   ClipFile sound;
-  double factor = 1;  ///< by which the samples were multiplied
+  double factor = 1;         ///< by which the samples were multiplied
+  uint64_t frame_count = 0;  ///< of the file
+  uint32_t sample_rate_hz = 0;
+  bool is_cut = false;                        ///< whether the sound was longer than the file
   std::map<std::string, std::string> labels;  ///< of the trace's author
   std::vector<v1::ContactTraceObject> objects;
   std::vector<ClipFile> stems;  ///< one for each object, or none
@@ -45,5 +48,24 @@ std::string ErrorLine(const std::string& clip, const absl::Status& error);
 /// Returns whether the record `clip`.json in `folder` was made from this trace with these settings,
 /// and whether all its files are there with the digests that the record states.
 bool IsRendered(const std::filesystem::path& folder, const ClipRecord& wanted);
+
+/// What the records of a folder say together.
+struct ClipTotals {
+  struct LimitedClip {
+    std::string clip;
+    double share = 0;  ///< of its frames in which the limiter reduced the gain
+  };
+
+  uint64_t clip_count = 0;  ///< without those that could not be rendered
+  uint64_t frame_count = 0;
+  uint64_t limited_frame_count = 0;
+  double peak_pa = 0;                      ///< of the loudest clip
+  std::vector<LimitedClip> limited_clips;  ///< the most altered one first
+  /// "3 clips have CONTACTS_LATE, for instance NAME: TEXT", one for each warning that clips have.
+  std::vector<std::string> warnings;
+};
+
+/// Adds up the records of a manifest.
+ClipTotals TotalsOf(const std::filesystem::path& manifest);
 
 }  // namespace carillon::cli

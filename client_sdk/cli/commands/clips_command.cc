@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -21,6 +22,7 @@
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
@@ -32,8 +34,18 @@ namespace fs = std::filesystem;
 class ClipRenderer {
  public:
   ClipRenderer(const client::Client& daemon, const RenderOptions& options, const ClipFolder& folder,
-               std::string settings)
-      : daemon_(daemon), options_(options), folder_(folder), settings_(std::move(settings)) {}
+               const StopSignal& stop, std::string settings)
+      : daemon_(daemon),
+        options_(options),
+        folder_(folder),
+        stop_(stop),
+        settings_(std::move(settings)) {}
+
+  /// Whether a signal has asked to end the run.
+  bool IsInterrupted() const {
+    if (!interrupted_ && stop_.ArrivesWithin(0)) interrupted_ = true;
+    return interrupted_;
+  }
 
   /// Returns whether there was anything to do. Errors: those of the trace and of the daemon.
   absl::StatusOr<bool> Render(const std::string& clip) const {
@@ -77,18 +89,9 @@ class ClipRenderer {
     }
   }
 
-  RenderedForm FormOf(const std::string& file) const {
-    return {.path = folder_.Work(file).string(),
-            .format = {.sample_rate_hz = options_.sample_rate_hz,
-                       .channel_count = options_.channel_count,
-                       .bits = options_.bits}};
-  }
-
   absl::Status RenderSound(const std::string& trace, ClipRecord& record) const {
     record.sound.name = absl::StrCat(record.clip, ".wav");
-    RenderedForm form = FormOf(record.sound.name);
-    form.factor = options_.gain;
-    form.normalize = options_.normalize;
+    const RenderedForm form = FormOf(options_, folder_.Work(record.sound.name).string());
     v1::RenderSettings settings = SettingsOf(options_);
     settings.set_tell_blows(true);
     RETURN_IF_ERROR(RenderFile(trace, settings, form, record));
@@ -105,9 +108,11 @@ class ClipRenderer {
   absl::Status RenderStem(const std::string& trace, uint32_t handle, ClipRecord& record) const {
     ClipFile stem;
     stem.name = absl::StrCat(record.clip, ".stems/", handle, ".wav");
-    RenderedForm form = FormOf(stem.name);
+    RenderedForm form = FormOf(options_, folder_.Work(stem.name).string());
     form.factor = record.factor;
-    form.frame_count = record.summary.frame_count();
+    form.normalize = false;
+    form.frame_count = record.frame_count;
+    if (!record.is_cut) form.fade_frame_count = 0;
     const std::string alone = folder_.Work(absl::StrCat(record.clip, ".alone")).string();
     RETURN_IF_ERROR(WriteAlone(trace, handle, alone));
     ClipRecord unused;
@@ -145,7 +150,8 @@ class ClipRenderer {
     while (true) {
       absl::Status status = TryRenderFile(path, settings, form, record);
       const std::string reason = status.ok() ? "" : ToErrorInfo(status).reason();
-      if (reason != "TOO_MANY_CALLS" && reason != "CLIENT_LIMIT_REACHED") return status;
+      const bool may_soon = reason == "TOO_MANY_CALLS" || reason == "CLIENT_LIMIT_REACHED";
+      if (!may_soon || IsInterrupted()) return status;
       std::this_thread::sleep_for(kPause);
     }
   }
@@ -156,20 +162,26 @@ class ClipRenderer {
     RenderedFile file(form);
     record.blows.clear();
     auto summary = daemon_.Render(
-        settings, trace, [&](const client::AudioBlock& block) { return file.Take(block); },
+        settings, trace,
+        [&](const client::AudioBlock& block) { return !IsInterrupted() && file.Take(block); },
         [&](const v1::Blow& blow) { record.blows.push_back(blow); });
     RETURN_IF_ERROR(file.status());
     RETURN_IF_ERROR(summary.status());
     RETURN_IF_ERROR(file.Finish());
     record.summary = *std::move(summary);
     record.factor = file.factor();
+    record.frame_count = file.frame_count();
+    record.sample_rate_hz = form.format.sample_rate_hz;
+    record.is_cut = file.is_cut();
     return absl::OkStatus();
   }
 
   const client::Client& daemon_;
   const RenderOptions& options_;
   const ClipFolder& folder_;
+  const StopSignal& stop_;
   const std::string settings_;
+  mutable std::atomic<bool> interrupted_{false};
 };
 
 /// Whether an error would meet every other clip, too.
@@ -208,6 +220,10 @@ class ClipRun {
       ++(*rendered ? rendered_count_ : kept_count_);
       return;
     }
+    if (renderer_.IsInterrupted()) {
+      return Stop(Refusal(absl::StatusCode::kCancelled, "RENDERING_STOPPED",
+                          "a signal ended the run; the same command continues it"));
+    }
     if (StopsAll(rendered.status())) return Stop(rendered.status());
     ++failed_count_;
     const absl::Status recorded = renderer_.RecordError(clip, rendered.status());
@@ -233,12 +249,52 @@ std::vector<std::string> OfShard(const std::vector<std::string>& clips, const Sh
   return mine;
 }
 
-void PrintRun(const ClipRun& run, double seconds, bool json) {
-  if (json) {
-    absl::PrintF("{\"rendered\":%d,\"kept\":%d,\"failed\":%d,\"seconds\":%.3f}\n",
-                 run.rendered_count(), run.kept_count(), run.failed_count(), seconds);
-    return;
+/// Returns the least full scale, Pa, rounded up to three digits, at which the limiter alters no
+/// clip.
+double FullScaleForAll(const ClipTotals& totals) {
+  const double wanted_pa = std::max(totals.peak_pa * kLimiterHeadroom, kLeastFullScale_pa);
+  const double unit = std::pow(10, std::floor(std::log10(wanted_pa)) - 2);
+  return std::ceil(wanted_pa / unit) * unit;
+}
+
+void PrintRunJson(const ClipRun& run, const ClipTotals& totals, double seconds) {
+  std::vector<JsonMember> members = {{"rendered", run.rendered_count()},
+                                     {"kept", run.kept_count()},
+                                     {"failed", run.failed_count()},
+                                     {"seconds", seconds},
+                                     {"frame_count", totals.frame_count},
+                                     {"limited_frame_count", totals.limited_frame_count},
+                                     {"limited_clip_count", uint64_t{totals.limited_clips.size()}},
+                                     {"peak_pa", totals.peak_pa},
+                                     {"warnings", totals.warnings}};
+  if (totals.peak_pa > 0) members.push_back({"full_scale_for_all_pa", FullScaleForAll(totals)});
+  PrintJson(members);
+}
+
+/// Prints what the limiter did to the clips of the folder, and the full scale that suits all.
+void PrintLevels(const RenderOptions& options, const ClipTotals& totals) {
+  constexpr size_t kShown = 5;
+  if (!totals.limited_clips.empty()) {
+    absl::PrintF("the limiter altered %s of %d, in %.2g %% of all frames:\n",
+                 Counted(totals.limited_clips.size(), "clip"), totals.clip_count,
+                 100 * static_cast<double>(totals.limited_frame_count) /
+                     static_cast<double>(totals.frame_count));
   }
+  for (size_t i = 0; i < std::min(kShown, totals.limited_clips.size()); ++i) {
+    absl::PrintF("  %s: %.2g %% of its frames\n", EscapedText(totals.limited_clips[i].clip),
+                 100 * totals.limited_clips[i].share);
+  }
+  if (totals.limited_clips.size() > kShown) {
+    absl::PrintF("  and others: limited_frame_count in manifest.jsonl\n");
+  }
+  if (totals.peak_pa > 0 && !options.normalize) {
+    absl::PrintF("the loudest clip peaks at %.3g Pa; --full-scale-pa %.4g suits all clips\n",
+                 totals.peak_pa, FullScaleForAll(totals));
+  }
+  for (const std::string& warning : totals.warnings) absl::PrintF("%s\n", warning);
+}
+
+void PrintRun(const ClipRun& run, double seconds) {
   absl::PrintF("%s in %.1f s (%.0f an hour), %d there already, %d failed\n",
                Counted(run.rendered_count(), "clip"), seconds,
                static_cast<double>(run.rendered_count()) * 3600 / std::max(seconds, 1e-3),
@@ -247,17 +303,26 @@ void PrintRun(const ClipRun& run, double seconds, bool json) {
 
 }  // namespace
 
-absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json) {
+absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options,
+                         const StopSignal& stop, bool json) {
   const auto begin = std::chrono::steady_clock::now();
   ASSIGN_OR_RETURN(const std::vector<std::string> clips, ListTraces(options.trace));
   ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());
   ASSIGN_OR_RETURN(const ClipFolder folder, ClipFolder::Open(options.out));
-  const ClipRenderer renderer(daemon, options, folder, SettingsText(options, mixer.version()));
+  const ClipRenderer renderer(daemon, options, folder, stop,
+                              SettingsText(options, mixer.version()));
   ClipRun run(renderer, OfShard(clips, options.shard));
   const absl::Status stopped = run.Run(options.worker_count);
   RETURN_IF_ERROR(folder.WriteManifest(clips));
-  PrintRun(run, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
-           json);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const ClipTotals totals = TotalsOf(folder.Final("manifest.jsonl"));
+  if (json) {
+    PrintRunJson(run, totals, seconds);
+  } else {
+    PrintRun(run, seconds);
+    PrintLevels(options, totals);
+  }
   RETURN_IF_ERROR(stopped);
   if (run.failed_count() == 0) return absl::OkStatus();
   return Refusal(absl::StatusCode::kFailedPrecondition, "CLIPS_FAILED",

@@ -11,6 +11,8 @@
 #include "client_sdk/cli/commands/example_bodies.h"
 #include "client_sdk/cli/commands/material_figures.h"
 #include "client_sdk/cli/commands/stop_signal.h"
+#include "client_sdk/cli/output/message_json.h"
+#include "client_sdk/cli/output/rendered_file.h"
 
 namespace carillon::client {
 class JobRunClient;
@@ -37,6 +39,7 @@ struct CreateModelOptions {
   /// Whether to ask again with repair, while waiting, if the surface is refused and may be
   /// repaired.
   bool may_repair = true;
+  std::string report;  ///< file that gets a line of JSON for each mesh file; empty: none
 };
 
 /// The options of `carillon transfer`.
@@ -64,7 +67,7 @@ struct ImportOptions {
   std::string format;        ///< empty: by the file's suffix
   std::string label;         ///< empty: the name that a glTF gives, or none
   std::string pick;          ///< a model of a glTF: its name or number, or the name of a node
-  MaterialFigures material;  ///< overrides the material that a glTF states
+  MaterialFigures material;  ///< of objects that name none; overrides that which a glTF states
 };
 
 /// The options of `carillon job run`.
@@ -87,6 +90,8 @@ struct StrikeOptions {
   bool paper_coupling = false;
   bool modes_only = false;
   std::optional<double> seconds;  ///< absent: until the longest mode is 60 dB down, 30 s at most
+  std::string out;                ///< WAV file to write instead of sounding; empty: none
+  bool normalize = false;         ///< as in RenderOptions
 };
 
 /// The options of `carillon volume`.
@@ -123,6 +128,9 @@ struct RenderOptions {
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`; a
                            ///< soft sound is first rendered again with a finer full scale
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
+  std::optional<double> length_s;  ///< of the file: a longer sound is cut, and a shorter one is
+                                   ///< followed by silence; absent: that of the sound
+  double fade_s = 0.01;            ///< over which a sound that is cut fades out
   // These apply to a folder only.
   bool stems = false;       ///< write the sound of each object alone, too
   size_t worker_count = 1;  ///< clips at a time
@@ -137,6 +145,9 @@ absl::Status ShowStatus(const client::Client& daemon, const std::string& server,
 /// Shows which services are SERVING. Errors: those of Client::IsServing, FailedPrecondition
 /// (NOT_SERVING), if one of them is not.
 absl::Status ShowHealth(const client::Client& daemon, bool json);
+/// Creates the models of files. A file that gives no model does not stop the others. Errors: that
+/// of the file if there is one file; otherwise FailedPrecondition (MODELS_FAILED), Internal
+/// (OUTPUT_NOT_WRITABLE: the report), Unavailable (SERVER_UNAVAILABLE), which stops all.
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
 absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
@@ -165,6 +176,9 @@ absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::s
 absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json);
 absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json);
 absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json);
+/// Explains an error reason or a warning, or lists all if `name` is empty. Errors: InvalidArgument
+/// (UNKNOWN_REASON).
+absl::Status Explain(const std::string& name, bool json);
 absl::Status ListMaterials(const client::Client& daemon, bool json);
 absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json);
 /// Lists the scenes and their objects.
@@ -190,12 +204,23 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop, bool json);
-absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json);
+/// Renders a trace to a file. As JSON, `members` follow the summary.
+absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json,
+                    std::vector<JsonMember> members = {});
 /// Renders the contact traces of a folder into another folder (ClipFolder). Clips that are there
 /// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
-/// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED).
-absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options, bool json);
+/// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED), Cancelled
+/// (RENDERING_STOPPED: `stop` has arrived).
+absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options,
+                         const StopSignal& stop, bool json);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
+/// Returns how the sound of a trace is written to the file `path`.
+RenderedForm FormOf(const RenderOptions& options, const std::string& path);
+/// The least full scale that the contract allows, Pa.
+inline constexpr double kLeastFullScale_pa = 0.00002;
+/// The limiter works from 3 dB below full scale on. This factor of a sound's peak is a full scale
+/// at which it does not work.
+inline constexpr double kLimiterHeadroom = 1.4126;
 /// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised.
 /// Tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut, and
 /// the limiter changes a loud one. Returns nothing if the rendering is neither soft nor limited, is

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The commands that show and end jobs, materials and scenes, and that write the examples.
+// The commands that show and end jobs, materials, reasons and scenes, and that write the examples.
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
@@ -22,6 +22,7 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/reason_catalogue.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
@@ -156,6 +157,29 @@ absl::Status ShowMaterial(const client::Client& daemon, const std::string& name,
   unknown.set_preset(name);
   // Its error names the nearest materials.
   return ResolveMaterial(unknown).status();
+}
+
+absl::Status Explain(const std::string& name, bool json) {
+  std::vector<CatalogueReason> reasons = Reasons();
+  if (!name.empty()) {
+    ASSIGN_OR_RETURN(const CatalogueReason reason, FindReason(name));
+    reasons = {reason};
+  }
+  for (const CatalogueReason& reason : reasons) {
+    if (json) {
+      PrintJson({{"reason", reason.name},
+                 {"code", reason.code},
+                 {"meaning", reason.meaning},
+                 {"repair", reason.repair}});
+    } else if (name.empty()) {
+      absl::PrintF("%-30s %s\n", reason.name, reason.meaning);
+    } else {
+      absl::PrintF("%s (%s)\nmeaning    %s\n", reason.name,
+                   reason.code.empty() ? "a warning" : reason.code, reason.meaning);
+      if (!reason.repair.empty()) absl::PrintF("repair     %s\n", reason.repair);
+    }
+  }
+  return absl::OkStatus();
 }
 
 absl::Status ListScenes(const client::Client& daemon, bool json) {

@@ -12,6 +12,7 @@
 #include "absl/time/time.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/find_model.h"
+#include "client_sdk/cli/commands/mode_sound.h"
 #include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
 #include "proto/cpp/error_reason.h"
@@ -24,39 +25,8 @@
 namespace carillon::cli {
 namespace {
 
-// As the daemon has them: how far the speed of sound of a material may be from that of a transfer,
-// and its Poisson's ratio from that of a model.
-constexpr double kSpeedTolerance = 0.05;
+/// As the daemon has it: how far the Poisson's ratio of a material may be from that of a model.
 constexpr double kPoissonTolerance = 1.0001e-4;
-
-std::string Format(const CreateModelOptions& options, const std::string& file) {
-  return options.format.empty() ? MeshFormatOf(file) : options.format;
-}
-
-std::string LabelOf(const CreateModelOptions& options, const std::string& file) {
-  return options.label.empty() ? std::filesystem::path(file).stem().string() : options.label;
-}
-
-absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
-                                                        const std::string& file,
-                                                        std::string mesh_digest) {
-  ASSIGN_OR_RETURN(auto material, ToMaterial(options.material));
-  v1::CreateModalModelRequest request;
-  request.set_mesh_digest(std::move(mesh_digest));
-  request.set_mesh_format(Format(options, file));
-  *request.mutable_settings() = options.settings;
-  request.set_coarse_first(options.coarse_first);
-  request.set_without_transfer(options.without_transfer);
-  *request.mutable_material() = std::move(material);
-  request.set_size(options.size);
-  request.set_min_frequency_hz(options.min_frequency_hz);
-  request.set_max_frequency_hz(options.max_frequency_hz);
-  request.set_priority(options.priority);
-  request.set_time_limit_s(options.time_limit_s);
-  request.set_memory_limit_bytes(options.memory_limit_mib << 20U);
-  request.set_label(LabelOf(options, file));
-  return request;
-}
 
 const char* ElementName(v1::Element element) {
   return element == v1::ELEMENT_LINEAR ? "linear" : "quadratic";
@@ -117,130 +87,41 @@ void PrintRow(const v1::ModalModelSummary& model) {
                EscapedText(model.label()));
 }
 
-/// Returns the transfer with which an object of `material` sounds, or null if none fits.
-const v1::TransferSummary* FittingTransfer(const v1::ModalModelSummary& model,
-                                           const v1::Material& material) {
-  const double speed_m_per_s = std::sqrt(material.young_pa() / material.density_kg_per_m3());
-  const v1::TransferSummary* nearest = nullptr;
-  double least = kSpeedTolerance;
-  for (const v1::TransferSummary& transfer : model.transfers()) {
-    const v1::TransferHeader& header = transfer.header();
-    const double distance =
-        std::abs(std::log(speed_m_per_s / (header.speed_ratio() * header.sound_speed_m_per_s())));
-    if (distance > least || transfer.power_integrals_size() != model.eigenvalues_size()) continue;
-    least = distance;
-    nearest = &transfer;
+/// Prints the frequencies and decay rates of the modes, and the decay by radiation where a transfer
+/// fits.
+void PrintModes(const std::vector<ModeSound>& modes) {
+  const bool radiates = !modes.empty() && modes.front().radiation_decay_per_s.has_value();
+  absl::PrintF("\n%5s %14s %14s %12s", "mode", "natural Hz", "damped Hz", "material 1/s");
+  if (radiates) {
+    absl::PrintF(" %13s %9s\n", "radiation 1/s", "T60 s");
+  } else {
+    absl::PrintF("  %s\n", "T60 s by the material alone");
   }
-  return nearest;
+  for (size_t i = 0; i < modes.size(); ++i) {
+    const ModeSound& mode = modes[i];
+    const std::string by_radiation =
+        radiates ? absl::StrFormat(" %13.4f", mode.radiation_decay_per_s.value_or(0)) : "";
+    absl::PrintF("%5d %14.3f %14.3f %12.4f%s %9.3f\n", i + 1, mode.natural_hz, mode.damped_hz,
+                 mode.material_decay_per_s, by_radiation, mode.T60());
+  }
 }
 
-/// Prints the frequencies and decay rates of the modes for `material`, with Lambda = eigenvalue
-/// E/rho, and the decay by radiation, rho_air Lambda I / (2 c rho), where a transfer fits.
-void PrintModes(const v1::ModalModelSummary& model, const v1::Material& material) {
-  const v1::TransferSummary* const transfer = FittingTransfer(model, material);
-  absl::PrintF("\n%5s %14s %14s %12s", "mode", "natural Hz", "damped Hz", "material 1/s");
-  if (transfer == nullptr) {
-    absl::PrintF("  %s\n", "T60 s by the material alone");
-  } else {
-    absl::PrintF(" %13s %9s\n", "radiation 1/s", "T60 s");
-  }
-  for (int i = 0; i < model.eigenvalues_size(); ++i) {
-    const double lambda = model.eigenvalues(i) * material.young_pa() / material.density_kg_per_m3();
-    const double natural_hz = std::sqrt(lambda) / (2 * std::numbers::pi);
-    const double by_material = DecayRatePerS(material, natural_hz);
-    double sigma = by_material;
-    std::string by_radiation;
-    if (transfer != nullptr) {
-      const v1::TransferHeader& air = transfer->header();
-      const double radiated = air.air_density_kg_per_m3() * lambda * transfer->power_integrals(i) /
-                              (2 * air.sound_speed_m_per_s() * material.density_kg_per_m3());
-      by_radiation = absl::StrFormat(" %13.4f", radiated);
-      sigma += radiated;
-    }
-    const double damped = std::sqrt(std::fmax(0, lambda - sigma * sigma));
-    absl::PrintF("%5d %14.3f %14.3f %12.4f%s %9.3f\n", i + 1, natural_hz,
-                 damped / (2 * std::numbers::pi), by_material, by_radiation,
-                 std::log(1000) / sigma);
-  }
+/// Returns the frequency, Hz, up to which the model has all modes of a body of `material`.
+double CompleteToHz(const v1::ModalModelSummary& model, const v1::Material& material) {
+  const double lambda =
+      model.header().complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
+  return std::sqrt(lambda) / (2 * std::numbers::pi);
 }
 
 /// Prints up to where the model has all modes of a body of `material`.
 void PrintBand(const v1::ModalModelSummary& model, const v1::Material& material) {
   const v1::ModalModelHeader& header = model.header();
-  const double lambda =
-      header.complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
-  absl::PrintF("band       all modes up to %.5g Hz", std::sqrt(lambda) / (2 * std::numbers::pi));
+  absl::PrintF("band       all modes up to %.5g Hz", CompleteToHz(model, material));
   if (header.lowered_from_mode_count() > 0) {
     absl::PrintF(", lowered from some %s below 20 kHz",
                  Counted(header.lowered_from_mode_count(), "mode"));
   }
   absl::PrintF("\n");
-}
-
-/// Asks for the model of one file.
-absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
-                                     const CreateModelOptions& options, const std::string& file) {
-  ASSIGN_OR_RETURN(const std::string bytes, ReadMeshFile(file, Format(options, file)));
-  ASSIGN_OR_RETURN(std::string digest, daemon.UploadMesh(bytes));
-  ASSIGN_OR_RETURN(const v1::CreateModalModelRequest request,
-                   MakeRequest(options, file, std::move(digest)));
-  return daemon.CreateModalModel(request);
-}
-
-/// Whether a command waits for its job, and how it prints it.
-struct Conclusion {
-  bool wait;
-  bool json;
-  /// Returns the name that the command prints if it prints no JSON.
-  const std::string& (v1::Job::*name)() const;
-};
-
-absl::Status Conclude(const client::Client& daemon, absl::StatusOr<v1::Job> job,
-                      const Conclusion& conclusion) {
-  if (job.ok() && conclusion.wait) job = WatchWithProgress(daemon, job->name());
-  if (!job.ok()) return job.status();
-  if (conclusion.json) {
-    PrintJson(*job);
-  } else {
-    absl::PrintF("%s\n", ((*job).*conclusion.name)());
-  }
-  return absl::OkStatus();
-}
-
-bool HelpsToRepair(const v1::Remedy& remedy) { return remedy.field() == "settings.mesh.repair"; }
-
-/// Waits for the job of one file. A surface that is refused, and that repair may help, is asked for
-/// again with repair; where that fails, too, its refusal is returned, which also names the first.
-absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateModelOptions& options,
-                                   const std::string& file, const std::string& job) {
-  absl::StatusOr<v1::Job> ended = WatchWithProgress(daemon, job);
-  const v1::ErrorInfo refusal = ended.ok() ? v1::ErrorInfo() : ToErrorInfo(ended.status());
-  if (!options.may_repair || std::ranges::none_of(refusal.remedies(), HelpsToRepair)) return ended;
-  absl::FPrintF(stderr, "carillon: %s is asked for again with --repair: %s: %s\n", file,
-                refusal.reason(), refusal.message());
-  CreateModelOptions repairing = options;
-  repairing.settings.mutable_mesh()->set_repair(true);
-  absl::StatusOr<v1::Job> repaired = RequestModel(daemon, repairing, file);
-  if (repaired.ok()) repaired = WatchWithProgress(daemon, repaired->name());
-  return repaired;
-}
-
-/// Prints how a user sees whether a job that nobody waits for fails.
-void PrintHowToFollow(const v1::Job& job) {
-  absl::FPrintF(stderr, "carillon: %s is being computed; follow it with: carillon job watch %s\n",
-                EscapedText(job.label()), ShortName(job));
-}
-
-/// Prints what the user should know about a model that was just made, or was there before.
-void PrintWarnings(const client::Client& daemon, const std::string& name,
-                   const std::string& wanted_label) {
-  const auto model = daemon.GetModalModel(name);
-  if (!model.ok()) return;
-  for (const std::string& warning : model->header().warnings()) {
-    absl::FPrintF(stderr, "warning: %s\n", EscapedText(warning));
-  }
-  const std::string other = OtherLabel(*model, wanted_label);
-  if (!other.empty()) absl::FPrintF(stderr, "warning: %s\n", EscapedText(other));
 }
 
 double SoundSpeed(const v1::Material& resolved) {
@@ -283,30 +164,6 @@ void Shorten(v1::ModalModelSummary& model) {
 
 }  // namespace
 
-absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
-                         bool json) {
-  // All are requested before the first is waited for, so that they are computed side by side.
-  std::vector<absl::StatusOr<v1::Job>> jobs;
-  for (const std::string& file : options.files) {
-    jobs.push_back(RequestModel(daemon, options, file));
-  }
-  absl::Status first_error;
-  for (size_t i = 0; i < jobs.size(); ++i) {
-    absl::StatusOr<v1::Job> job = std::move(jobs[i]);
-    if (job.ok() && options.wait) job = AwaitModel(daemon, options, options.files[i], job->name());
-    if (job.ok() && job->state() == v1::JOB_STATE_SUCCEEDED) {
-      PrintWarnings(daemon, job->modal_model(), LabelOf(options, options.files[i]));
-    }
-    if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) PrintHowToFollow(*job);
-    const absl::Status ended = Conclude(
-        daemon, std::move(job), {.wait = false, .json = json, .name = &v1::Job::modal_model});
-    if (ended.ok()) continue;
-    if (!first_error.ok()) (void)Report(first_error);
-    first_error = ended;
-  }
-  return first_error;
-}
-
 absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOptions& options,
                             bool json) {
   ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
@@ -320,8 +177,16 @@ absl::Status CreateTransfer(const client::Client& daemon, const CreateTransferOp
   request.set_size(options.size);
   request.mutable_settings()->set_accuracy_db(options.accuracy_db);
   request.mutable_settings()->set_budget_s(options.budget_s);
-  return Conclude(daemon, daemon.CreateTransfer(request),
-                  {.wait = options.wait, .json = json, .name = &v1::Job::name});
+  ASSIGN_OR_RETURN(v1::Job job, daemon.CreateTransfer(request));
+  if (options.wait) {
+    ASSIGN_OR_RETURN(job, WatchWithProgress(daemon, job.name()));
+  }
+  if (json) {
+    PrintJson(job);
+  } else {
+    absl::PrintF("%s\n", job.name());
+  }
+  return absl::OkStatus();
 }
 
 absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsRequest& filter,
@@ -350,18 +215,21 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json) {
   ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
   ASSIGN_OR_RETURN(const auto model, daemon.GetModalModel(name));
-  if (json) {
-    PrintJson(model);
-    return absl::OkStatus();
-  }
   ASSIGN_OR_RETURN(const auto given, ToMaterial(figures));
   const bool is_given = !given.preset().empty() || given.has_young_pa();
   const v1::Material& chosen = is_given ? given : model.material();
   const bool has_material = is_given || model.has_material();
   ASSIGN_OR_RETURN(const auto material, has_material ? ResolveMaterial(chosen) : chosen);
+  if (json) {
+    std::vector<JsonMember> members;
+    if (has_material) members = ModeMembers(ModesOf(model, material));
+    if (has_material) members.push_back({"complete_to_hz", CompleteToHz(model, material)});
+    absl::PrintF("%s\n", MessageJson(model, members));
+    return absl::OkStatus();
+  }
   PrintSummary(model);
   if (has_material) PrintBand(model, material);
-  if (has_material) PrintModes(model, material);
+  if (has_material) PrintModes(ModesOf(model, material));
   return absl::OkStatus();
 }
 

@@ -48,7 +48,7 @@ bool IsGiven(const v1::Material& material) {
          material.has_alpha2_per_s() || material.loss_factor_size() > 0;
 }
 
-/// Returns the material of the command line, which only a glTF needs.
+/// Returns the material of the command line for an export, which only a glTF needs.
 absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
                                          const MaterialFigures& figures) {
   absl::StatusOr<v1::Material> material = ToMaterial(figures);
@@ -100,7 +100,7 @@ absl::StatusOr<v1::ModalModelSummary> Store(const client::Client& daemon, const 
 /// The result of an import.
 struct Imported {
   v1::ModalModelSummary summary;
-  std::string sounds_with;  ///< the options of a material, if the file states one
+  v1::Material material;  ///< of the file, or of the command line; empty: neither has one
 };
 
 /// Returns the command-line options of a material.
@@ -127,22 +127,24 @@ absl::StatusOr<Imported> ImportGltf(const client::Client& daemon, const ImportOp
                    interchange::ReadGltfModel(options.file, options.pick, material));
   ASSIGN_OR_RETURN(auto summary,
                    Store(daemon, read.model, options.label.empty() ? read.label : options.label));
-  return Imported{.summary = std::move(summary), .sounds_with = OptionsOf(read.material)};
+  return Imported{.summary = std::move(summary), .material = read.material};
 }
 
-absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOptions& options) {
+absl::StatusOr<Imported> ImportNpz(const client::Client& daemon, const ImportOptions& options,
+                                   const v1::Material& material) {
   ASSIGN_OR_RETURN(const StoredModel model, interchange::ReadNpz(options.file));
   ASSIGN_OR_RETURN(auto summary, Store(daemon, model, options.label));
-  return Imported{.summary = std::move(summary), .sounds_with = ""};
+  return Imported{.summary = std::move(summary), .material = material};
 }
 
 /// Imports a file in the stored form. If its name is a digest, the model gets that name, because
 /// the stored form rounds nothing.
-absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const ImportOptions& options) {
+absl::StatusOr<Imported> ImportStored(const client::Client& daemon, const ImportOptions& options,
+                                      const v1::Material& material) {
   const std::string stem = std::filesystem::path(options.file).stem();
   const std::string name = IsDigest(stem) ? absl::StrCat("modalModels/", stem) : "";
   ASSIGN_OR_RETURN(auto summary, daemon.ImportModalModelFile(options.file, name, options.label));
-  return Imported{.summary = std::move(summary), .sounds_with = ""};
+  return Imported{.summary = std::move(summary), .material = material};
 }
 
 /// Sets the label of an imported model to that of the options, even if the daemon had stored the
@@ -160,6 +162,28 @@ void Label(const client::Client& daemon, const ImportOptions& options,
   request.set_label(label);
   absl::StatusOr<v1::ModalModelSummary> labelled = daemon.UpdateModalModel(request);
   if (labelled.ok()) model = *std::move(labelled);
+}
+
+/// Gives an imported model the material of the file or of the command line, which objects have that
+/// name no material. The daemon refuses a material for which the model is not made.
+absl::Status SetMaterial(const client::Client& daemon, bool is_asked_for, Imported& imported) {
+  if (!IsGiven(imported.material)) {
+    if (imported.summary.has_material()) return absl::OkStatus();
+    absl::FPrintF(stderr,
+                  "carillon: the file names no material, so objects must name one; or give "
+                  "it to the model by `carillon model tag MODEL --material NAME`\n");
+    return absl::OkStatus();
+  }
+  if (imported.material.preset().empty()) {
+    absl::FPrintF(stderr, "carillon: the file's material is %s\n", OptionsOf(imported.material));
+  }
+  // A model that was stored before keeps its material, unless the user wants another.
+  if (imported.summary.has_material() && !is_asked_for) return absl::OkStatus();
+  v1::UpdateModalModelRequest request;
+  request.set_name(imported.summary.name());
+  *request.mutable_material() = imported.material;
+  ASSIGN_OR_RETURN(imported.summary, daemon.UpdateModalModel(request));
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -184,18 +208,15 @@ absl::Status ExportModel(const client::Client& daemon, const ExportOptions& opti
 
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json) {
   const std::string format = FormatOf(options.file, options.format);
-  ASSIGN_OR_RETURN(const auto material, MaterialFor(format, options.material));
+  ASSIGN_OR_RETURN(const auto material, ToMaterial(options.material));
   ASSIGN_OR_RETURN(auto imported, IsGltf(format)    ? ImportGltf(daemon, options, material)
-                                  : format == "npz" ? ImportNpz(daemon, options)
-                                                    : ImportStored(daemon, options));
+                                  : format == "npz" ? ImportNpz(daemon, options, material)
+                                                    : ImportStored(daemon, options, material));
   Label(daemon, options, imported.summary);
+  RETURN_IF_ERROR(SetMaterial(daemon, IsGiven(material), imported));
   // To stderr, so that stdout is the name alone.
   for (const std::string& warning : imported.summary.header().warnings()) {
     absl::FPrintF(stderr, "carillon: %s\n", warning);
-  }
-  if (!imported.sounds_with.empty()) {
-    absl::FPrintF(stderr, "carillon: the model sounds as the file says with %s\n",
-                  imported.sounds_with);
   }
   const std::string shared = SharedLabel(daemon, imported.summary);
   if (!shared.empty()) absl::FPrintF(stderr, "carillon: %s\n", shared);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -15,14 +18,10 @@
 namespace carillon::cli {
 namespace {
 
-/// The limiter works from 3 dB below full scale on.
-constexpr double kHeadroom = 1.4126;
 /// -40 dB of full scale: a softer sound is rendered again before it is normalised.
 constexpr double kSoft = 0.01;
 /// -60 dB of full scale: a softer file is hardly heard.
 constexpr double kFaint = 0.001;
-/// The least full scale that the contract allows, Pa.
-constexpr double kLeastFullScale_pa = 0.00002;
 
 /// Prints what the user should know about the sound.
 void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summary, std::FILE* out) {
@@ -69,7 +68,8 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   PrintFindings(options, summary, out);
   if (summary.limited_frame_count() > 0) {
     absl::FPrintF(out, "the limiter worked in %s; --full-scale-pa above %.4g would avoid it\n",
-                  Counted(summary.limited_frame_count(), "frame"), summary.peak_pa() * kHeadroom);
+                  Counted(summary.limited_frame_count(), "frame"),
+                  summary.peak_pa() * kLimiterHeadroom);
   }
 }
 
@@ -86,6 +86,28 @@ void PrintFile(const RenderOptions& options, const RenderedFile& file) {
                   "avoid it\n",
                   Counted(file.clipped_count(), "sample"), options.gain / file.peak());
   }
+  if (file.is_cut()) {
+    absl::FPrintF(out, "the sound is longer than the file, and fades out over its last %.4g s\n",
+                  options.fade_s);
+  }
+}
+
+/// Prints the summary, the file, and the labels of the trace as JSON.
+void PrintRenderingJson(const RenderOptions& options, const v1::RenderSummary& summary,
+                        const RenderedFile& file, const v1::ContactTraceHeader& trace,
+                        std::vector<JsonMember> members) {
+  const double seconds = static_cast<double>(file.frame_count()) / options.sample_rate_hz;
+  members.insert(members.begin(), {{"file", options.out},
+                                   {"seconds", seconds},
+                                   {"file_peak", double{file.peak()}},
+                                   {"factor", file.factor()},
+                                   {"clipped_sample_count", file.clipped_count()}});
+  if (options.length_s) members.push_back({"cut", file.is_cut()});
+  if (!trace.labels().empty()) {
+    members.push_back({"labels", std::map<std::string, std::string>(trace.labels().begin(),
+                                                                    trace.labels().end())});
+  }
+  absl::PrintF("%s\n", MessageJson(summary, members));
 }
 
 }  // namespace
@@ -97,6 +119,20 @@ v1::RenderSettings SettingsOf(const RenderOptions& options) {
   settings.set_tail_s(options.tail_s);
   if (options.full_scale_pa) settings.set_full_scale_pa(*options.full_scale_pa);
   return settings;
+}
+
+RenderedForm FormOf(const RenderOptions& options, const std::string& path) {
+  RenderedForm form{.path = path,
+                    .format = {.sample_rate_hz = options.sample_rate_hz,
+                               .channel_count = options.channel_count,
+                               .bits = options.bits},
+                    .factor = options.gain,
+                    .normalize = options.normalize};
+  if (options.length_s) {
+    form.frame_count = std::llround(*options.length_s * options.sample_rate_hz);
+    form.fade_frame_count = std::llround(options.fade_s * options.sample_rate_hz);
+  }
+  return form;
 }
 
 std::optional<double> BetterFullScale(const RenderOptions& options,
@@ -117,15 +153,13 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
   return absl::OkStatus();
 }
 
-absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json) {
-  RenderedFile file({.path = options.out,
-                     .format = {.sample_rate_hz = options.sample_rate_hz,
-                                .channel_count = options.channel_count,
-                                .bits = options.bits},
-                     .factor = options.gain,
-                     .normalize = options.normalize});
+absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json,
+                    std::vector<JsonMember> members) {
+  RenderedFile file(FormOf(options, options.out));
+  v1::ContactTraceHeader header;
   const auto render = [&](const v1::RenderSettings& settings) -> absl::StatusOr<v1::RenderSummary> {
     ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
+    header = trace.header();
     return daemon.Render(settings, trace,
                          [&](const client::AudioBlock& block) { return file.Take(block); });
   };
@@ -144,7 +178,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   RETURN_IF_ERROR(file.Finish());
   RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
   if (json) {
-    PrintJson(*summary);
+    PrintRenderingJson(options, *summary, file, header, std::move(members));
   } else {
     PrintSummary(options, *summary, options.sample_rate_hz);
     PrintFile(options, file);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,7 @@
 #include "carillon/contact_trace.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/find_model.h"
+#include "client_sdk/cli/commands/mode_sound.h"
 #include "client_sdk/cli/output/output.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
@@ -46,6 +48,11 @@ void Set(v1::Vec3& vector, const std::array<double, 3>& components) {
   vector.set_z(components[2]);
 }
 
+v1::RadiationModel RadiationOf(const StrikeOptions& options) {
+  if (options.paper_coupling) return v1::RADIATION_MODEL_PAPER_COUPLING;
+  return options.modes_only ? v1::RADIATION_MODEL_MODES_ONLY : v1::RADIATION_MODEL_UNSPECIFIED;
+}
+
 absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const std::string& scene,
                                              const StrikeOptions& options) {
   ASSIGN_OR_RETURN(const auto model, FindModel(daemon, options.model));
@@ -57,8 +64,7 @@ absl::StatusOr<v1::SoundingObject> AddObject(const client::Client& daemon, const
   if (material.ByteSizeLong() > 0) *object.mutable_material() = material;
   object.set_size(options.size);
   object.set_gain(options.gain);
-  if (options.paper_coupling) object.set_radiation(v1::RADIATION_MODEL_PAPER_COUPLING);
-  if (options.modes_only) object.set_radiation(v1::RADIATION_MODEL_MODES_ONLY);
+  object.set_radiation(RadiationOf(options));
   ASSIGN_OR_RETURN(const auto added, daemon.AddObjects(request));
   return added.front();
 }
@@ -104,6 +110,23 @@ struct MeasuredStrike {
   uint64_t limited_frame_count = 0;  ///< as the limiter of an output at full volume counts them
 };
 
+/// A file in memory, which has a path as long as the object lives. Without memory for it, writing
+/// to the path fails.
+class TraceInMemory {
+ public:
+  TraceInMemory() : descriptor_(memfd_create("strike", MFD_CLOEXEC)) {}
+  TraceInMemory(const TraceInMemory&) = delete;
+  TraceInMemory& operator=(const TraceInMemory&) = delete;
+  ~TraceInMemory() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+
+  std::string path() const { return absl::StrCat("/proc/self/fd/", descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
 /// Writes the strike as a trace to `file`.
 absl::Status WriteTrace(const v1::SoundingObject& object, const StrikeOptions& options,
                         const std::string& file) {
@@ -130,28 +153,21 @@ std::optional<MeasuredStrike> Measure(const client::Client& daemon,
                                       const v1::SoundingObject& object,
                                       const StrikeOptions& options) {
   constexpr double kBeginning = 0.25;  // seconds
-  const int memory = memfd_create("strike", MFD_CLOEXEC);
-  if (memory < 0) return std::nullopt;
-  const std::string file = absl::StrCat("/proc/self/fd/", memory);
-  std::optional<MeasuredStrike> measured;
-  const absl::Status written = WriteTrace(object, options, file);
-  auto trace = client::ContactTraceReader::Open(file);
-  if (written.ok() && trace.ok()) {
-    v1::RenderSettings settings;
-    settings.set_tail_s(kBeginning);
-    settings.set_tell_blows(true);
-    double duration_s = 0;
-    const auto summary = daemon.Render(
-        settings, *trace, [](const client::AudioBlock&) { return true; },
-        [&](const v1::Blow& blow) { duration_s = blow.duration_s(); });
-    if (summary.ok()) {
-      measured = {.peak_pa = summary->peak_pa(),
-                  .duration_s = duration_s,
-                  .limited_frame_count = summary->limited_frame_count()};
-    }
-  }
-  close(memory);
-  return measured;
+  const TraceInMemory memory;
+  if (!WriteTrace(object, options, memory.path()).ok()) return std::nullopt;
+  auto trace = client::ContactTraceReader::Open(memory.path());
+  if (!trace.ok()) return std::nullopt;
+  v1::RenderSettings settings;
+  settings.set_tail_s(kBeginning);
+  settings.set_tell_blows(true);
+  double duration_s = 0;
+  const auto summary = daemon.Render(
+      settings, *trace, [](const client::AudioBlock&) { return true; },
+      [&](const v1::Blow& blow) { duration_s = blow.duration_s(); });
+  if (!summary.ok()) return std::nullopt;
+  return MeasuredStrike{.peak_pa = summary->peak_pa(),
+                        .duration_s = duration_s,
+                        .limited_frame_count = summary->limited_frame_count()};
 }
 
 /// Prints what sounds, and how.
@@ -177,6 +193,13 @@ void PrintStrikeJson(const client::Client& daemon, const v1::SoundingObject& obj
                      const StrikeOptions& options, const std::vector<std::string>& warnings) {
   std::vector<JsonMember> members = {{"seconds", options.seconds.value_or(SoundingSeconds(object))},
                                      {"warnings", warnings}};
+  if (const auto model = daemon.GetModalModel(object.modal_model()); model.ok()) {
+    for (JsonMember& member :
+         ModeMembers(ModesOf(*model, object.material(), object.size()),
+                     object.lowest_frequency_hz(), object.highest_frequency_hz())) {
+      members.push_back(std::move(member));
+    }
+  }
   if (const auto measured = Measure(daemon, object, options)) {
     members.push_back({"contact_duration_s", measured->duration_s});
     members.push_back({"peak_pa", measured->peak_pa});
@@ -200,10 +223,33 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
   return absl::OkStatus();
 }
 
+/// Renders the strike to a file, and plays nothing.
+absl::Status StrikeToFile(const client::Client& daemon, const StrikeOptions& options, bool json) {
+  v1::SoundingObject object;
+  ASSIGN_OR_RETURN(*object.mutable_modal_model(), FindModel(daemon, options.model));
+  ASSIGN_OR_RETURN(const v1::ModalModelSummary model, daemon.GetModalModel(object.modal_model()));
+  ASSIGN_OR_RETURN(*object.mutable_material(), ToMaterial(options.material));
+  if (object.material().ByteSizeLong() == 0) *object.mutable_material() = model.material();
+  ASSIGN_OR_RETURN(const v1::Material material, ResolveMaterial(object.material()));
+  object.set_handle(1);
+  object.set_size(options.size);
+  object.set_gain(options.gain);
+  object.set_radiation(RadiationOf(options));
+  const TraceInMemory trace;
+  RETURN_IF_ERROR(WriteTrace(object, options, trace.path()));
+  RenderOptions rendering;
+  rendering.trace = trace.path();
+  rendering.out = options.out;
+  rendering.normalize = options.normalize;
+  rendering.length_s = options.seconds;
+  return Render(daemon, rendering, json, ModeMembers(ModesOf(model, material, options.size)));
+}
+
 }  // namespace
 
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json) {
+  if (!options.out.empty()) return StrikeToFile(daemon, options, json);
   ASSIGN_OR_RETURN(const auto scene, daemon.CreateScene());
   const absl::Status struck = StrikeIn(daemon, scene.name(), options, stop, json);
   const absl::Status deleted = daemon.DeleteScene(scene.name());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The command lines of `carillon job`, `carillon material`, `carillon scene` and `carillon
-// example`.
+// The command lines of `carillon job`, `carillon material`, `carillon explain`, `carillon scene`
+// and `carillon example`.
 #include "client_sdk/cli/options/list_options.h"
 
 #include <CLI/CLI.hpp>
@@ -143,6 +143,16 @@ void AddMaterials(CLI::App& app, Program& program) {
       return name->empty() ? ListMaterials(*program.Daemon(), program.json)
                            : ShowMaterial(*program.Daemon(), *name, program.json);
     };
+  });
+}
+
+void AddExplain(CLI::App& app, Program& program) {
+  auto name = std::make_shared<std::string>();
+  CLI::App& explain = *app.add_subcommand(
+      "explain", "Say what the reason of an error or the id of a warning means, and what to do");
+  explain.add_option("reason", *name, "The reason, such as MESH_NOT_CLOSED [a list of all]");
+  explain.callback([&program, name] {
+    program.command = [&program, name] { return Explain(*name, program.json); };
   });
 }
 

@@ -9,10 +9,11 @@ class App;
 
 namespace carillon::cli {
 
-/// These functions add `carillon job`, `carillon material`, `carillon scene` and `carillon example`
-/// with their commands.
+/// These functions add `carillon job`, `carillon material`, `carillon explain`, `carillon scene`
+/// and `carillon example` with their commands.
 void AddJob(CLI::App& app, Program& program);
 void AddMaterials(CLI::App& app, Program& program);
+void AddExplain(CLI::App& app, Program& program);
 void AddScenes(CLI::App& app, Program& program);
 void AddExample(CLI::App& app, Program& program);
 

@@ -75,11 +75,16 @@ void AddModelCreate(CLI::App& app, Program& program) {
   options->wait = isatty(STDERR_FILENO) != 0;
   create.add_flag("--wait,!--no-wait", options->wait,
                   "show the progress and end with the jobs [on a terminal]");
+  create.add_option(
+      "--report", options->report,
+      "a file that gets a line of JSON for each mesh file: its model, frequencies, T60 "
+      "and warnings, or its error; implies --wait");
   create.add_flag("--may-repair,!--no-repair", options->may_repair,
                   "with --wait, repair a surface that is refused otherwise, and say so [yes]");
   AddMaterial(create, options->material);
   AddSettingsOptions(create, options->settings);
-  create.callback([&program, options] {
+  create.callback([&program, &create, options] {
+    if (!options->report.empty() && create.count("--wait") == 0) options->wait = true;
     if (options->files.size() > 1 && !options->label.empty()) {
       throw CLI::ValidationError("--label", "several files would get the same label");
     }

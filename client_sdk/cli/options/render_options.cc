@@ -53,6 +53,15 @@ void AddSound(CLI::App& render, RenderOptions& options) {
                   "The number of channels: 1 for mono, 2 for stereo")
       ->check(CLI::Range(1, 2))
       ->capture_default_str();
+  TakeWithin(*render.add_option("--length", options.length_s,
+                                "The length of each file, s: a longer sound is cut, and a shorter "
+                                "one is followed by silence [that of the sound]"),
+             0.001, 1e5, "leave it out for the length of the sound");
+  TakeSeconds(*render
+                   .add_option("--fade", options.fade_s,
+                               "The time over which a sound that --length cuts fades out, s")
+                   ->needs("--length")
+                   ->capture_default_str());
   render.add_option(
       "--tail", options.tail_s,
       "The time to render after the last contact, s; 0 renders until the sound has died "
@@ -122,8 +131,9 @@ void AddRender(CLI::App& app, Program& program) {
     CheckUse(render, *options);
     CheckJson(program, options->out);
     program.command = [&program, options] {
-      return IsFolder(options->trace) ? RenderClips(*program.Daemon(), *options, program.json)
-                                      : Render(*program.Daemon(), *options, program.json);
+      if (!IsFolder(options->trace)) return Render(*program.Daemon(), *options, program.json);
+      const StopSignal stop;
+      return RenderClips(*program.Daemon(), *options, stop, program.json);
     };
   });
 }

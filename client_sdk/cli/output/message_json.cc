@@ -94,7 +94,7 @@ std::string JsonLine(const Json& json) {
 
 }  // namespace
 
-std::string MembersJson(std::initializer_list<JsonMember> members) {
+std::string MembersJson(const std::vector<JsonMember>& members) {
   Json object = Json::object();
   for (const JsonMember& member : members) Append(member, object);
   return JsonLine(object);

@@ -3,7 +3,7 @@
 
 #include <google/protobuf/message.h>
 
-#include <initializer_list>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
@@ -18,12 +18,15 @@ std::string MessageJson(const google::protobuf::Message& message);
 /// A member of a JSON object that is no message of the contract.
 struct JsonMember {
   const char* name;
-  std::variant<std::string, uint64_t, double, std::vector<std::string>> value;
+  std::variant<std::string, bool, uint64_t, double, std::vector<std::string>, std::vector<double>,
+               std::map<std::string, std::string>>
+      value;
 };
 
 /// Returns an object with the members in their order, as JSON in one line. Text that is not UTF-8,
-/// as names of files may be, gets a replacement character for each wrong byte.
-std::string MembersJson(std::initializer_list<JsonMember> members);
+/// as names of files may be, gets a replacement character for each wrong byte. A number that is not
+/// finite is null.
+std::string MembersJson(const std::vector<JsonMember>& members);
 
 /// Returns a message as MessageJson does, followed by the members.
 std::string MessageJson(const google::protobuf::Message& message,

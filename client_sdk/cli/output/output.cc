@@ -35,8 +35,9 @@ absl::Status FlushOutput() {
                               "takes it"));
 }
 
-int Report(const absl::Status& status) {
+int Report(const absl::Status& status, bool json) {
   if (status.ok()) return kDone;
+  if (json) absl::PrintF("%s\n", ErrorJson(status));
   const v1::ErrorInfo error = ToErrorInfo(status);
   std::string message = error.message();
   std::ranges::replace(message, '\n', ' ');
@@ -47,11 +48,15 @@ int Report(const absl::Status& status) {
   return error.reason() == "SERVER_UNAVAILABLE" ? kNoServer : kRefused;
 }
 
+std::string ErrorJson(const absl::Status& status) {
+  return absl::StrCat("{\"error\":", MessageJson(ToErrorInfo(status)), "}");
+}
+
 void PrintJson(const google::protobuf::Message& message) {
   absl::PrintF("%s\n", MessageJson(message));
 }
 
-void PrintJson(std::initializer_list<JsonMember> members) {
+void PrintJson(const std::vector<JsonMember>& members) {
   absl::PrintF("%s\n", MembersJson(members));
 }
 

@@ -4,8 +4,8 @@
 #include <google/protobuf/message.h>
 
 #include <cstdint>
-#include <initializer_list>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
@@ -23,14 +23,19 @@ void OpenStandardStreams();
 /// Flushes stdout. Errors: Internal (OUTPUT_NOT_WRITABLE: a part of the output is lost).
 absl::Status FlushOutput();
 
-/// Prints "carillon: REASON: message" to stderr if `status` is an error. Returns the exit code.
-int Report(const absl::Status& status);
+/// Prints "carillon: REASON: message" to stderr if `status` is an error, and with `json` to stdout
+/// what ErrorJson returns. Returns the exit code.
+int Report(const absl::Status& status, bool json = false);
+
+/// Returns an error as {"error": {...}} with the members of ErrorInfo: its reason, its message, its
+/// figures ("metadata") and its remedies.
+std::string ErrorJson(const absl::Status& status);
 
 /// Prints `message` to stdout as one line of JSON; see MessageJson.
 void PrintJson(const google::protobuf::Message& message);
 
 /// Prints an object with the members to stdout as one line of JSON; see MembersJson.
-void PrintJson(std::initializer_list<JsonMember> members);
+void PrintJson(const std::vector<JsonMember>& members);
 
 /// Prints to stderr that a list has no entry of the kind `noun`, so that stdout stays empty.
 void PrintNothing(absl::string_view noun);

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
 #include <utility>
 
 namespace carillon::cli {
@@ -12,7 +15,7 @@ RenderedFile::RenderedFile(RenderedForm form) : form_(std::move(form)), factor_(
 bool RenderedFile::Take(const client::AudioBlock& block) {
   if (!file_) Begin();
   samples_.insert(samples_.end(), block.samples.begin(), block.samples.end());
-  if (!form_.normalize && status_.ok()) Write();
+  if (!form_.normalize && status_.ok()) Write(false);
   return status_.ok();
 }
 
@@ -20,11 +23,12 @@ absl::Status RenderedFile::Finish() {
   constexpr double kPeak = 0.9;
   if (form_.frame_count && !file_) Begin();
   if (form_.normalize) {
+    samples_.resize(Cut(true));
     float peak = 0;
     for (const float sample : samples_) peak = std::max(peak, std::abs(sample));
     if (peak > 0) factor_ *= kPeak / peak;
-    if (file_ && status_.ok()) Write();
   }
+  if (file_ && status_.ok()) Write(true);
   if (form_.frame_count && status_.ok()) FillUp();
   return status_.ok() && file_ ? file_->Finish() : status_;
 }
@@ -35,19 +39,37 @@ void RenderedFile::Begin() {
   if (file.ok()) file_ = *std::move(file);
 }
 
-void RenderedFile::Write() {
-  if (form_.frame_count) {
-    const uint64_t wanted = *form_.frame_count * form_.format.channel_count - written_count_;
-    samples_.resize(static_cast<size_t>(std::min<uint64_t>(samples_.size(), wanted)));
+size_t RenderedFile::Cut(bool last) {
+  if (!form_.frame_count) return samples_.size();
+  const uint64_t channels = form_.format.channel_count;
+  const uint64_t room = *form_.frame_count * channels - written_count_;
+  const uint64_t fade = std::min(form_.fade_frame_count, *form_.frame_count) * channels;
+  const uint64_t unfaded = room - std::min(room, fade);
+  if (samples_.size() <= room) return last ? samples_.size() : std::min(samples_.size(), unfaded);
+  samples_.resize(room);
+  if (!cut_) {
+    // The gain falls as half a period of a cosine from the first frame of the fade to its end.
+    for (uint64_t i = unfaded; i < room; ++i) {
+      const double part =
+          static_cast<double>((i - unfaded) / channels) / static_cast<double>(fade / channels);
+      samples_[i] *= static_cast<float>(0.5 + 0.5 * std::cos(std::numbers::pi * part));
+    }
   }
-  for (float& sample : samples_) {
+  cut_ = true;
+  return room;
+}
+
+void RenderedFile::Write(bool last) {
+  const size_t count = Cut(last);
+  const std::span<float> ready(samples_.data(), count);
+  for (float& sample : ready) {
     sample *= static_cast<float>(factor_);
     peak_ = std::max(peak_, std::abs(sample));
     if (form_.format.clips() && std::abs(sample) > 1) ++clipped_count_;
   }
-  status_ = file_->Write(samples_);
-  written_count_ += samples_.size();
-  samples_.clear();
+  status_ = file_->Write(ready);
+  written_count_ += count;
+  samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 void RenderedFile::FillUp() {
@@ -55,7 +77,7 @@ void RenderedFile::FillUp() {
   const uint64_t wanted = *form_.frame_count * form_.format.channel_count;
   while (written_count_ < wanted && status_.ok()) {
     samples_.assign(static_cast<size_t>(std::min(kPiece, wanted - written_count_)), 0.0F);
-    Write();
+    Write(true);
   }
 }
 

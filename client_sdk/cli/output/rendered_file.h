@@ -21,6 +21,7 @@ struct RenderedForm {
   /// The length of the file. A longer sound is cut, and a shorter one is followed by silence. If
   /// the length is absent, the file is as long as the sound.
   std::optional<uint64_t> frame_count = std::nullopt;
+  uint64_t fade_frame_count = 0;  ///< frames over which a sound that is cut fades out
 };
 
 /// Writes the blocks of a rendering to a file, or collects them first if their peak must be known.
@@ -33,7 +34,10 @@ class RenderedFile {
 
   /// Forgets the blocks that a form with `normalize` has collected, so that another rendering can
   /// take their place.
-  void Restart() { samples_.clear(); }
+  void Restart() {
+    samples_.clear();
+    cut_ = false;
+  }
 
   /// Completes the file. Errors: Internal (OUTPUT_NOT_WRITABLE).
   absl::Status Finish();
@@ -43,18 +47,28 @@ class RenderedFile {
   double factor() const { return factor_; }
   /// The largest magnitude of the samples in the file, before they are clipped.
   float peak() const { return peak_; }
+  /// Whether the sound was longer than the file.
+  bool is_cut() const { return cut_; }
+  /// Number of frames in the file. Call it when the file is complete.
+  uint64_t frame_count() const { return written_count_ / form_.format.channel_count; }
   /// Number of samples that were clipped to full scale. A file of 32 bits clips none.
   uint64_t clipped_count() const { return clipped_count_; }
 
  private:
   void Begin();
-  void Write();
+  /// Writes the samples that were taken. Unless they are the last ones, keeps those that fade if
+  /// the sound is cut.
+  void Write(bool last);
+  /// Drops samples beyond the length of the file, and fades the last ones out. Returns the number
+  /// of samples that can be written.
+  size_t Cut(bool last);
   void FillUp();
 
   const RenderedForm form_;
   double factor_;
   std::optional<WaveFile> file_;
   uint64_t written_count_ = 0;  // samples
+  bool cut_ = false;
   float peak_ = 0;
   uint64_t clipped_count_ = 0;
   std::vector<float> samples_;

@@ -148,6 +148,17 @@ class InterchangeTest(DaemonTest):
             self.assertRegex(said, r"Faces: +12\n")
             self.assertRegex(said, r"Maximum point +\(0\.2000*\d? 0\.0160*\d? 0\.0100*\d?\)")
 
+    def test_an_imported_model_has_the_material_of_the_gltf_or_of_the_command(self):
+        path = self.exported(self.name, "kept.glb", "--material", meshes.MATERIAL)
+        model, _ = self.imported(path)
+        kept = json.loads(self.daemon.command("--json", "model", "show", model).stdout)["material"]
+        self.assertAlmostEqual(kept["young_pa"] / 6.835179e10, 1, places=6)
+        self.exported(model, "told.npz")
+        self.daemon.command("model", "delete", model)
+        model, _ = self.imported(self.folder / "told.npz", "--material", meshes.MATERIAL)
+        told = json.loads(self.daemon.command("--json", "model", "show", model).stdout)["material"]
+        self.assertEqual(told["preset"], meshes.MATERIAL)
+
     def test_a_model_by_way_of_gltf_sounds_as_before(self):
         path = self.exported(self.name, "sounds.glb", "--material", meshes.MATERIAL)
         model, _ = self.imported(path)

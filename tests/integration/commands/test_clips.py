@@ -13,6 +13,7 @@ import random
 import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
 import numpy
@@ -40,7 +41,7 @@ def manifest(folder):
 def write_trace(model, path, number):
     """Two bars: one is struck by a named impulse, then the second strikes it as an engine would say."""
     rng = random.Random(number)
-    trace = carillon.Trace(step=0.01, simulator="test")
+    trace = carillon.Trace(step=0.01, simulator="test", labels={"number": str(number), "Ort": "Köln"})
     left, right = (trace.add(model, meshes.MATERIAL, label=name, handle=handle)
                    for name, handle in (("left \"bar\"", 3), ("right", 7)))
     for step in range(8):
@@ -188,6 +189,69 @@ class ClipsTest(DaemonTest):
         numpy.testing.assert_allclose(second["impulse_newton_seconds"], (0, 0, 0.03), rtol=1e-5)
         # The daemon sends a blow when the engine's contact is over.
         self.assertTrue(0.04 <= first["time_s"] <= 0.05)
+
+    def test_the_record_has_the_labels_of_the_author(self):
+        self.assertEqual([line["labels"] for line in manifest(self.whole)],
+                         [{"Ort": "Köln", "number": str(number)} for number in range(CLIP_COUNT)])
+
+    def test_clips_of_one_length_are_cut_or_followed_by_silence(self):
+        out = self.new_folder()
+        lengths = [line["seconds"] for line in manifest(self.whole)]
+        length_s = sorted(lengths)[CLIP_COUNT // 2] - 0.001
+        self.run_ended(self.render(out, "--stems", "--length", length_s, "--fade", 0.02))
+        frames = round(48000 * length_s)
+        for line, before in zip(manifest(out), manifest(self.whole)):
+            clip, whole = (sound.read_wave(folder / line["file"])[:, 0] for folder in (out, self.whole))
+            self.assertEqual((len(clip), line["frame_count"]), (frames, frames))
+            self.assertEqual(line["cut"], before["frame_count"] > frames)
+            kept = min(frames - 960 if line["cut"] else frames, len(whole))
+            numpy.testing.assert_array_equal(clip[:kept], whole[:kept])
+            self.assertTrue((clip[len(whole):] == 0).all())
+            if line["cut"]:
+                fade = 0.5 + 0.5 * numpy.cos(numpy.pi * numpy.arange(960) / 960)
+                numpy.testing.assert_allclose(clip[-960:], whole[frames - 960:frames] * fade, atol=2**-22)
+            stems = [sound.read_wave(out / item["file"])[:, 0] for item in line["objects"]]
+            numpy.testing.assert_allclose(sum(stems), clip, atol=1.1e-4)
+
+    def test_a_run_says_what_the_limiter_did_and_which_full_scale_suits_all(self):
+        out = self.new_folder()
+        loudest = max(line["peak_pa"] for line in manifest(self.whole))
+        told = json.loads(self.run_ended(self.render(out, "--full-scale-pa", loudest / 2, "--json")).stdout)
+        lines = manifest(out)
+        limited = [line for line in lines if line["limited_frame_count"]]
+        self.assertEqual(told["limited_clip_count"], len(limited))
+        self.assertGreater(len(limited), 0)
+        self.assertEqual(told["limited_frame_count"], sum(line["limited_frame_count"] for line in lines))
+        printed = self.run_ended(self.render(out, "--full-scale-pa", loudest / 2)).stdout
+        self.assertIn(f"--full-scale-pa {told['full_scale_for_all_pa']:.4g} suits all clips", printed)
+        again = json.loads(self.run_ended(
+            self.render(out, "--full-scale-pa", told["full_scale_for_all_pa"], "--json")).stdout)
+        self.assertEqual((again["rendered"], again["limited_frame_count"]), (CLIP_COUNT, 0))
+
+    def test_an_interrupted_run_ends_with_a_manifest_and_is_continued(self):
+        out = self.new_folder()
+        run = subprocess.Popen(self.command(self.traces, out, "--stems", "--workers", 1), stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+        while not list(out.glob("*.json")) and run.poll() is None:
+            time.sleep(0.01)
+        run.send_signal(signal.SIGINT)
+        self.assertIn("RENDERING_STOPPED", run.communicate()[1])
+        self.assertEqual(run.returncode, 1)
+        self.assertEqual([line["clip"] for line in manifest(out)],
+                         sorted(path.stem for path in out.glob("*.json")))
+        self.assertEqual(list(out.glob(".work-*")), [])
+        self.run_ended(self.render(out, "--stems"))
+        self.assertEqual(contents(out), self.expected)
+
+    def test_names_with_spaces_and_letters_of_any_language_are_kept(self):
+        traces, out = self.new_folder(), self.new_folder()
+        traces.mkdir(parents=True)
+        for name in ("zwei Glöckchen 鐘", "a;b'c\"d"):
+            (traces / f"{name}.contacts").write_bytes((self.traces / "000.contacts").read_bytes())
+        self.run_ended(self.render(out, "--stems", traces=traces))
+        self.assertEqual([line["clip"] for line in manifest(out)], ["a;b'c\"d", "zwei Glöckchen 鐘"])
+        kept = json.loads(self.run_ended(self.render(out, "--stems", "--json", traces=traces)).stdout)
+        self.assertEqual((kept["rendered"], kept["kept"]), (0, 2))
 
     def test_stems_add_up_to_the_clip(self):
         for line in manifest(self.whole)[:3]:

@@ -188,6 +188,70 @@ class ExampleTest(CommandLineTest):
         self.assertEqual(len(self.run_command("model", "create", *files, "--material", "bell_bronze").split()), 4)
 
 
+class ReportTest(CommandLineTest):
+    def test_a_table_has_a_row_for_each_file_also_for_those_that_fail(self):
+        names = ["gläserne Glocke 鐘.obj", "empty.obj", "bar.obj", "missing.obj"]
+        (self.folder / names[0]).write_bytes(meshes.obj(*meshes.box((0.1, 0.01, 0.02))))
+        (self.folder / names[1]).write_bytes(b"")
+        table = self.folder / "table.jsonl"
+        done = carillon("--server", self.daemon.server, "model", "create", *(self.folder / name for name in names),
+                        "--material", meshes.MATERIAL, "--without-transfer", "--report", table)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("MODELS_FAILED: 2 of 4 files", done.stderr)
+        rows = [json.loads(line) for line in table.read_text().splitlines()]
+        self.assertEqual([row["file"] for row in rows], [str(self.folder / name) for name in names])
+        self.assertEqual([row["error"]["reason"] for row in rows[1::2]], ["MESH_EMPTY", "MESH_FILE_NOT_READABLE"])
+        for row in rows[::2]:
+            shown = self.json_of("model", "show", row["modal_model"])
+            self.assertEqual((row["frequencies_hz"], row["t60_s"]), (shown["frequencies_hz"], shown["t60_s"]))
+            self.assertGreater(row["node_count"], 0)
+            self.assertEqual(row["warnings"], shown["header"]["warnings"])
+        self.assertEqual(rows[0]["label"], "gläserne Glocke 鐘")
+        self.assertEqual(done.stdout.split(), [row["modal_model"] for row in rows[::2]])
+
+    def test_frequencies_and_t60_are_those_of_the_material(self):
+        model = carillon_package.connect(self.daemon.server).model("bar")
+        shown = self.json_of("model", "show", "bar")
+        frequencies, decays = model.modes()
+        numpy.testing.assert_allclose(shown["frequencies_hz"], numpy.hypot(frequencies, decays / (2 * math.pi)),
+                                      rtol=1e-6)
+        numpy.testing.assert_allclose(shown["t60_s"], math.log(1000) / decays, rtol=1e-6)
+        undamped = self.json_of("model", "show", "bar", "--material", meshes.MATERIAL, "--loss-factor", "0", "--alpha1",
+                                "0", "--alpha2", "0")
+        self.assertEqual(set(undamped["t60_s"]), {None})
+
+    def test_a_strike_is_written_to_a_file_and_not_played(self):
+        for options, frames in ((("--seconds", "0.5"), 24000), ((), None)):
+            file = self.folder / "ein Schlag.wav"
+            told = self.json_of("strike", "bar", "--point", "0,0.008,0.005", "--impulse", "0,0,-0.01", "--out", file,
+                                "--normalize", *options)
+            heard = sound.read_wave(file)[:, 0]
+            self.assertEqual((told["file"], told["seconds"]), (str(file), len(heard) / 48000))
+            self.assertEqual(len(heard), frames or len(heard))
+            self.assertAlmostEqual(numpy.abs(heard).max(), 0.9, places=4)
+            spectrum = numpy.abs(numpy.fft.rfft(heard[:24000] * numpy.blackman(48000)[24000:]))
+            loudest_hz = 2.0 * numpy.argmax(spectrum)
+            self.assertLess(numpy.abs(numpy.array(told["frequencies_hz"]) - loudest_hz).min(), 2)
+        self.assertEqual(self.json_of("scene", "list")["scenes"], [])
+
+    def test_a_reason_is_explained_and_one_that_is_not_there_has_its_nearest(self):
+        told = self.json_of("explain", "mesh_not_closed")
+        self.assertEqual((told["reason"], told["code"]), ("MESH_NOT_CLOSED", "INVALID_ARGUMENT"))
+        self.assertIn(f"| {told['meaning']} | {told['repair']} |", (ROOT / "proto/README.md").read_text())
+        wrong = carillon("--json", "explain", "MESH_NOT_CLOSE")
+        self.assertEqual(wrong.returncode, 1)
+        error = json.loads(wrong.stdout)["error"]
+        self.assertEqual(error["reason"], "UNKNOWN_REASON")
+        self.assertIn("MESH_NOT_CLOSED", error["message"])
+        self.assertIn("CONTACTS_LATE", [line.split()[0] for line in carillon("explain").stdout.splitlines()])
+
+    def test_an_error_in_json_is_an_object(self):
+        failed = carillon("--server", self.daemon.server, "--json", "model", "show", "nothing")
+        self.assertEqual(failed.returncode, 1)
+        self.assertEqual(json.loads(failed.stdout)["error"]["reason"], "MODAL_MODEL_NOT_FOUND")
+        self.assertIn("carillon: MODAL_MODEL_NOT_FOUND", failed.stderr)
+
+
 class JsonTest(CommandLineTest):
     def test_commands_that_write_a_file_say_in_json_what_they_wrote(self):
         example = self.json_of("example", "bar", "--out", self.folder / "json.obj")

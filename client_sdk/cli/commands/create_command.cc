@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// `carillon model create FILE...`
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/commands/find_model.h"
+#include "client_sdk/cli/commands/mode_sound.h"
+#include "client_sdk/cli/output/job_progress.h"
+#include "client_sdk/cli/output/output.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/mesh_file.h"
+#include "proto/cpp/mesh_format.h"
+#include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string Format(const CreateModelOptions& options, const std::string& file) {
+  return options.format.empty() ? MeshFormatOf(file) : options.format;
+}
+
+/// Returns the label, in which bytes of a file's name that are not UTF-8 are escaped.
+std::string LabelOf(const CreateModelOptions& options, const std::string& file) {
+  return options.label.empty() ? EscapedText(std::filesystem::path(file).stem().string())
+                               : options.label;
+}
+
+absl::StatusOr<v1::CreateModalModelRequest> MakeRequest(const CreateModelOptions& options,
+                                                        const std::string& file,
+                                                        std::string mesh_digest) {
+  ASSIGN_OR_RETURN(auto material, ToMaterial(options.material));
+  v1::CreateModalModelRequest request;
+  request.set_mesh_digest(std::move(mesh_digest));
+  request.set_mesh_format(Format(options, file));
+  *request.mutable_settings() = options.settings;
+  request.set_coarse_first(options.coarse_first);
+  request.set_without_transfer(options.without_transfer);
+  *request.mutable_material() = std::move(material);
+  request.set_size(options.size);
+  request.set_min_frequency_hz(options.min_frequency_hz);
+  request.set_max_frequency_hz(options.max_frequency_hz);
+  request.set_priority(options.priority);
+  request.set_time_limit_s(options.time_limit_s);
+  request.set_memory_limit_bytes(options.memory_limit_mib << 20U);
+  request.set_label(LabelOf(options, file));
+  return request;
+}
+
+/// Asks for the model of one file.
+absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
+                                     const CreateModelOptions& options, const std::string& file) {
+  ASSIGN_OR_RETURN(const std::string bytes, ReadMeshFile(file, Format(options, file)));
+  ASSIGN_OR_RETURN(std::string digest, daemon.UploadMesh(bytes));
+  ASSIGN_OR_RETURN(const v1::CreateModalModelRequest request,
+                   MakeRequest(options, file, std::move(digest)));
+  return daemon.CreateModalModel(request);
+}
+
+bool HelpsToRepair(const v1::Remedy& remedy) { return remedy.field() == "settings.mesh.repair"; }
+
+/// Waits for the job of one file. A surface that is refused, and that repair may help, is asked for
+/// again with repair; where that fails, too, its refusal is returned, which also names the first.
+absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateModelOptions& options,
+                                   const std::string& file, const std::string& job) {
+  absl::StatusOr<v1::Job> ended = WatchWithProgress(daemon, job);
+  const v1::ErrorInfo refusal = ended.ok() ? v1::ErrorInfo() : ToErrorInfo(ended.status());
+  if (!options.may_repair || std::ranges::none_of(refusal.remedies(), HelpsToRepair)) return ended;
+  absl::FPrintF(stderr, "carillon: %s is asked for again with --repair: %s: %s\n", file,
+                refusal.reason(), refusal.message());
+  CreateModelOptions repairing = options;
+  repairing.settings.mutable_mesh()->set_repair(true);
+  absl::StatusOr<v1::Job> repaired = RequestModel(daemon, repairing, file);
+  if (repaired.ok()) repaired = WatchWithProgress(daemon, repaired->name());
+  return repaired;
+}
+
+/// Returns whether the daemon takes no more jobs of this client until some of them have ended.
+bool MustWait(const absl::Status& error) {
+  const std::string reason = ToErrorInfo(error).reason();
+  return reason == "QUEUE_FULL" || reason == "CLIENT_LIMIT_REACHED" || reason == "TOO_MANY_CALLS";
+}
+
+/// Creates the models of several files. All are requested before the first is waited for, as far as
+/// the daemon takes them, so that they are computed side by side.
+class ModelCreation {
+ public:
+  ModelCreation(const client::Client& daemon, const CreateModelOptions& options, bool json)
+      : daemon_(daemon), options_(options), json_(json) {}
+
+  /// Errors: Internal (OUTPUT_NOT_WRITABLE), Unavailable (SERVER_UNAVAILABLE), that of the file if
+  /// there is one file, FailedPrecondition (MODELS_FAILED) if there are several.
+  absl::Status Run() {
+    RETURN_IF_ERROR(OpenReport());
+    for (const std::string& file : options_.files) {
+      RETURN_IF_ERROR(Request(file));
+    }
+    while (!requested_.empty()) {
+      RETURN_IF_ERROR(FinishOldest());
+    }
+    if (failed_count_ == 0 || options_.files.size() == 1) return last_error_;
+    return Refusal(absl::StatusCode::kFailedPrecondition, "MODELS_FAILED",
+                   absl::StrCat(failed_count_, " of ", Counted(options_.files.size(), "file"),
+                                " gave no model; the messages above",
+                                options_.report.empty() ? "" : " and the rows of the report",
+                                " say why; repair them and run the command again"));
+  }
+
+ private:
+  struct Requested {
+    std::string file;
+    absl::StatusOr<v1::Job> job;
+    Clock::time_point begin;
+  };
+
+  absl::Status OpenReport() {
+    if (options_.report.empty()) return absl::OkStatus();
+    report_.open(options_.report, std::ios::binary | std::ios::trunc);
+    return CheckReport();
+  }
+
+  absl::Status CheckReport() const {
+    if (options_.report.empty() || report_) return absl::OkStatus();
+    return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                   absl::StrCat(options_.report,
+                                " cannot be written; check its folder, its "
+                                "permissions and the free space"));
+  }
+
+  absl::Status Request(const std::string& file) {
+    const Clock::time_point begin = Clock::now();
+    while (true) {
+      absl::StatusOr<v1::Job> job = RequestModel(daemon_, options_, file);
+      if (job.ok() || !options_.wait || !MustWait(job.status())) {
+        requested_.push_back({file, std::move(job), begin});
+        return absl::OkStatus();
+      }
+      if (requested_.empty()) {
+        std::this_thread::sleep_for(std::chrono::seconds(1));  // other clients fill the queue
+      } else {
+        RETURN_IF_ERROR(FinishOldest());
+      }
+    }
+  }
+
+  absl::Status FinishOldest() {
+    Requested oldest = std::move(requested_.front());
+    requested_.pop_front();
+    if (oldest.job.ok() && options_.wait) {
+      oldest.job = AwaitModel(daemon_, options_, oldest.file, oldest.job->name());
+    }
+    const double seconds = std::chrono::duration<double>(Clock::now() - oldest.begin).count();
+    return oldest.job.ok() ? Succeed(oldest.file, *oldest.job, seconds)
+                           : Fail(oldest.file, oldest.job.status());
+  }
+
+  absl::Status Succeed(const std::string& file, const v1::Job& job, double seconds) {
+    std::vector<JsonMember> members = {{"file", file}, {"seconds", seconds}};
+    if (job.state() == v1::JOB_STATE_SUCCEEDED) {
+      AddModel(file, job.modal_model(), members);
+    } else {
+      absl::FPrintF(stderr,
+                    "carillon: %s is being computed; follow it with: carillon job watch %s\n",
+                    EscapedText(job.label()), ShortName(job));
+    }
+    if (!json_) absl::PrintF("%s\n", job.modal_model());
+    return PrintRow(MessageJson(job, members));
+  }
+
+  absl::Status Fail(const std::string& file, const absl::Status& error) {
+    ++failed_count_;
+    last_error_ = error;
+    if (ToErrorInfo(error).reason() == "SERVER_UNAVAILABLE") return error;
+    const std::string members = MembersJson({{"file", file}});
+    const std::string row =
+        absl::StrCat(members.substr(0, members.size() - 1), ",", ErrorJson(error).substr(1));
+    if (options_.files.size() == 1) return WriteRow(row);  // the command ends with the error
+    absl::FPrintF(stderr, "carillon: %s:\n", EscapedText(file));
+    (void)Report(error);
+    return PrintRow(row);
+  }
+
+  absl::Status PrintRow(const std::string& row) {
+    if (json_) absl::PrintF("%s\n", row);
+    std::fflush(stdout);
+    return WriteRow(row);
+  }
+
+  absl::Status WriteRow(const std::string& row) {
+    if (options_.report.empty()) return absl::OkStatus();
+    report_ << row << '\n' << std::flush;
+    return CheckReport();
+  }
+
+  /// Prints what the user should know about a model that was just made, or was there before, and
+  /// adds its figures.
+  void AddModel(const std::string& file, const std::string& name,
+                std::vector<JsonMember>& members) const {
+    const auto model = daemon_.GetModalModel(name);
+    if (!model.ok()) return;  // it was deleted meanwhile
+    std::vector<std::string> warnings(model->header().warnings().begin(),
+                                      model->header().warnings().end());
+    const std::string other = OtherLabel(*model, LabelOf(options_, file));
+    if (!other.empty()) warnings.push_back(other);
+    for (const std::string& warning : warnings) {
+      absl::FPrintF(stderr, "warning: %s\n", EscapedText(warning));
+    }
+    members.push_back({"warnings", std::move(warnings)});
+    members.push_back({"node_count", uint64_t{model->header().node_count()}});
+    const auto asked = ToMaterial(options_.material);
+    const bool named = asked.ok() && asked->ByteSizeLong() > 0;
+    const auto material = ResolveMaterial(named ? *asked : model->material());
+    if (!material.ok()) return;
+    for (JsonMember& member : ModeMembers(ModesOf(*model, *material, options_.size))) {
+      members.push_back(std::move(member));
+    }
+  }
+
+  const client::Client& daemon_;
+  const CreateModelOptions& options_;
+  const bool json_;
+  std::ofstream report_;
+  std::deque<Requested> requested_;
+  size_t failed_count_ = 0;
+  absl::Status last_error_;
+};
+
+}  // namespace
+
+absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
+                         bool json) {
+  return ModelCreation(daemon, options, json).Run();
+}
+
+}  // namespace carillon::cli

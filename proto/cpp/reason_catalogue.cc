@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/cpp/reason_catalogue.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/near_names.h"
+
+namespace carillon {
+namespace {
+
+constexpr char kContract[] =
+#include "reasons.inc"
+    ;
+
+bool IsName(absl::string_view cell) {
+  return !cell.empty() && std::ranges::all_of(cell, [](unsigned char c) {
+    return absl::ascii_isupper(c) || absl::ascii_isdigit(c) || c == '_';
+  });
+}
+
+/// Reads the rows of the sections "Warnings" (name, meaning, counts, figures) and "Errors" (name,
+/// codes, meaning, repair).
+std::vector<CatalogueReason> ReadTables() {
+  std::vector<CatalogueReason> reasons;
+  absl::string_view section;
+  for (const absl::string_view line : absl::StrSplit(kContract, '\n')) {
+    if (absl::StartsWith(line, "## ")) section = line.substr(3);
+    const std::vector<std::string> cells = absl::StrSplit(line, " | ");
+    if (cells.size() != 4 || !absl::StartsWith(line, "| ")) continue;
+    const std::string name = cells[0].substr(2);
+    const std::string last(absl::StripSuffix(cells[3], " |"));
+    if (section == "Errors" && IsName(name)) {
+      reasons.push_back({.name = name, .code = cells[1], .meaning = cells[2], .repair = last});
+    } else if (section == "Warnings" && IsName(name)) {
+      reasons.push_back({.name = name, .code = "", .meaning = cells[1], .repair = ""});
+    }
+  }
+  return reasons;
+}
+
+/// Returns the names that have the most words of `name`, for instance MESH_NOT_CLOSED for
+/// CLOSED_MESH. Returns no names if none has one.
+std::vector<std::string> NamesWithWordsOf(const std::string& name,
+                                          const std::vector<std::string>& names) {
+  const std::vector<std::string> wanted = absl::StrSplit(name, '_', absl::SkipEmpty());
+  std::vector<std::string> best;
+  std::ptrdiff_t most = 1;
+  for (const std::string& other : names) {
+    const std::vector<std::string> words = absl::StrSplit(other, '_');
+    const std::ptrdiff_t common = std::ranges::count_if(
+        wanted, [&](const std::string& word) { return std::ranges::count(words, word) > 0; });
+    if (common > most) best.clear();
+    if (common >= most) best.push_back(other);
+    most = std::max(most, common);
+  }
+  return best;
+}
+
+}  // namespace
+
+const std::vector<CatalogueReason>& Reasons() {
+  static const std::vector<CatalogueReason> reasons = ReadTables();
+  return reasons;
+}
+
+absl::StatusOr<CatalogueReason> FindReason(const std::string& text) {
+  const std::string name = absl::AsciiStrToUpper(text.substr(0, text.find(':')));
+  std::vector<std::string> names;
+  for (const CatalogueReason& reason : Reasons()) {
+    if (reason.name == name) return reason;
+    names.push_back(reason.name);
+  }
+  std::vector<std::string> near = NearNames(name, names);
+  if (near.empty()) near = NamesWithWordsOf(name, names);
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "UNKNOWN_REASON",
+      absl::StrCat("there is no reason ", name, "; ",
+                   near.empty() ? "`carillon explain` lists all"
+                                : absl::StrCat("did you mean ", absl::StrJoin(near, " or "), "?")));
+}
+
+}  // namespace carillon

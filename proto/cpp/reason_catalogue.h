@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace carillon {
+
+/// A row of the tables of proto/README.md.
+struct CatalogueReason {
+  std::string name;     ///< "MESH_NOT_CLOSED"
+  std::string code;     ///< the gRPC codes; empty for a warning, which ends no call
+  std::string meaning;  ///< what is wrong
+  std::string repair;   ///< empty for a warning, whose text says it
+};
+
+/// Returns all error reasons and warnings, in the order of the tables.
+const std::vector<CatalogueReason>& Reasons();
+
+/// Returns the reason that `text` names in small or capital letters, or with which a message such
+/// as "MESH_NOT_CLOSED: ..." begins. Errors: InvalidArgument (UNKNOWN_REASON; names the nearest).
+absl::StatusOr<CatalogueReason> FindReason(const std::string& text);
+
+}  // namespace carillon

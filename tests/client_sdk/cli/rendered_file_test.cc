@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/output/rendered_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <vector>
+
+namespace carillon::cli {
+namespace {
+
+constexpr uint64_t kFadeFrames = 10;
+
+RenderedForm FormOf(uint64_t frame_count, uint64_t fade_frame_count = kFadeFrames) {
+  RenderedForm form;
+  form.frame_count = frame_count;
+  form.fade_frame_count = fade_frame_count;
+  return form;
+}
+
+/// Writes `sound` in blocks of `block` samples to a file of 32 bits, and reads that file back.
+struct Written {
+  Written(const std::vector<float>& sound, size_t block, RenderedForm form) {
+    form.path = testing::TempDir() + "RenderedFile" + std::to_string(getpid()) + ".wav";
+    form.format.bits = 32;
+    RenderedFile file(form);
+    const std::span<const float> all(sound);
+    for (size_t at = 0; at < all.size(); at += block) {
+      const auto samples = all.subspan(at, std::min(block, all.size() - at));
+      EXPECT_TRUE(file.Take({.sample_rate_hz = 48000, .channel_count = 1, .samples = samples}));
+    }
+    EXPECT_TRUE(file.Finish().ok());
+    cut = file.is_cut();
+    samples.resize(file.frame_count());
+    std::ifstream in(form.path, std::ios::binary);
+    const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
+    std::filesystem::remove(form.path);
+    const size_t size = samples.size() * sizeof(float);
+    EXPECT_GE(bytes.size(), size);
+    std::memcpy(samples.data(), bytes.data() + bytes.size() - size, size);
+  }
+
+  std::vector<float> samples;
+  bool cut = false;
+};
+
+TEST(RenderedFile, ALongerSoundIsCutAndFadesOut) {
+  const std::vector<float> sound(130, 0.5F);
+  for (const size_t block : {1, 7, 64, 130}) {
+    const Written written(sound, block, FormOf(100));
+    ASSERT_EQ(written.samples.size(), 100U) << block;
+    EXPECT_TRUE(written.cut);
+    for (size_t i = 0; i < 100; ++i) {
+      const double part = i < 90 ? 0 : static_cast<double>(i - 90) / kFadeFrames;
+      EXPECT_NEAR(written.samples[i], 0.25 + 0.25 * std::cos(std::numbers::pi * part), 1e-6)
+          << block << " " << i;
+    }
+  }
+}
+
+TEST(RenderedFile, AShorterSoundIsFollowedBySilenceAndNotFaded) {
+  const std::vector<float> sound(95, 0.5F);
+  for (const size_t block : {1, 64, 95}) {
+    const Written written(sound, block, FormOf(100));
+    ASSERT_EQ(written.samples.size(), 100U) << block;
+    EXPECT_FALSE(written.cut);
+    EXPECT_EQ(std::ranges::count(written.samples, 0.5F), 95);
+    EXPECT_EQ(written.samples.back(), 0);
+  }
+}
+
+TEST(RenderedFile, ASoundThatFitsStaysAsItIs) {
+  const std::vector<float> sound(100, 0.5F);
+  const Written written(sound, 33, FormOf(100));
+  EXPECT_EQ(written.samples, sound);
+  EXPECT_FALSE(written.cut);
+}
+
+TEST(RenderedFile, ThePeakOfAFileThatIsCutIsThatOfItsOwnSamples) {
+  std::vector<float> sound(130, 0.25F);
+  sound[120] = 1;
+  RenderedForm form = FormOf(100);
+  form.normalize = true;
+  const Written written(sound, 64, form);
+  EXPECT_FLOAT_EQ(*std::ranges::max_element(written.samples), 0.9F);
+}
+
+TEST(RenderedFile, AFadeAsLongAsTheFileBeginsAtItsBeginning) {
+  const Written written(std::vector<float>(30, 1.0F), 4, FormOf(20, 1000));
+  ASSERT_EQ(written.samples.size(), 20U);
+  EXPECT_EQ(written.samples.front(), 1);
+  EXPECT_NEAR(written.samples[10], 0.5, 1e-6);
+}
+
+}  // namespace
+}  // namespace carillon::cli

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "proto/cpp/reason_catalogue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(ReasonCatalogue, HasEveryRowWithItsCells) {
+  EXPECT_GT(Reasons().size(), 180U);
+  for (const CatalogueReason& reason : Reasons()) {
+    EXPECT_FALSE(reason.meaning.empty()) << reason.name;
+    EXPECT_EQ(reason.code.empty(), reason.repair.empty()) << reason.name;
+  }
+  EXPECT_TRUE(std::ranges::any_of(Reasons(), [](const CatalogueReason& reason) {
+    return reason.name == "CONTACTS_LATE" && reason.code.empty();
+  }));
+}
+
+TEST(ReasonCatalogue, IsFoundByNameInAnyLettersAndByAWholeMessage) {
+  for (const char* text : {"MESH_NOT_CLOSED", "mesh_not_closed", "MESH_NOT_CLOSED: 3 edges"}) {
+    const auto reason = FindReason(text);
+    ASSERT_TRUE(reason.ok()) << text;
+    EXPECT_EQ(reason->name, "MESH_NOT_CLOSED");
+    EXPECT_EQ(reason->code, "INVALID_ARGUMENT");
+  }
+}
+
+TEST(ReasonCatalogue, ANameThatIsNotThereHasItsNearest) {
+  EXPECT_THAT(FindReason("MESH_NOT_CLOSD").status().ToString(),
+              HasSubstr("UNKNOWN_REASON: there is no reason MESH_NOT_CLOSD; did you mean "
+                        "MESH_NOT_CLOSED?"));
+  EXPECT_THAT(FindReason("closed_mesh").status().ToString(),
+              HasSubstr("did you mean MESH_NOT_CLOSED?"));
+  EXPECT_THAT(FindReason("qqqqqqqqqqqq").status().ToString(), HasSubstr("lists all"));
+}
+
+}  // namespace
+}  // namespace carillon
