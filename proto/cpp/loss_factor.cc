@@ -14,7 +14,7 @@
 namespace carillon {
 
 double LossFactorAt(std::span<const LossFactorPoint> points, double frequency_hz) {
-  if (points.empty()) return 0;
+  if (points.empty() || points.front().loss_factor == 0) return 0;
   const auto above = std::ranges::upper_bound(points, frequency_hz, std::ranges::less(),
                                               &LossFactorPoint::frequency_hz);
   if (above == points.begin()) return points.front().loss_factor;

@@ -13,7 +13,8 @@ namespace carillon {
 /// rate of a mode of that frequency.
 struct LossFactorPoint {
   double frequency_hz = 0;  ///< above zero
-  double loss_factor = 0;   ///< above zero and below 2, where a mode would be overdamped
+  double loss_factor =
+      0;  ///< below 2, where a mode would be overdamped; zero at all points or at none
 };
 
 /// Returns the loss factor at a frequency. Between `points` (ascending) it is interpolated linearly

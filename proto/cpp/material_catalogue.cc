@@ -59,9 +59,11 @@ absl::Status CheckLossFactor(const v1::Material& m) {
       return OutOfRange("loss_factor.frequency_hz", point.frequency_hz(),
                         "greater than zero and than that of the point before");
     }
-    if (!(point.loss_factor() > 0 && point.loss_factor() < 2)) {
+    const bool none = m.loss_factor(0).loss_factor() == 0;
+    if (!(point.loss_factor() >= 0 && point.loss_factor() < 2) ||
+        (point.loss_factor() == 0) != none) {
       return OutOfRange("loss_factor.loss_factor", point.loss_factor(),
-                        "greater than zero and less than 2");
+                        "greater than zero and less than 2, or zero at every point");
     }
     last_hz = point.frequency_hz();
   }

@@ -27,7 +27,8 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
             "Damping in proportion to stiffness, s; it replaces a loss factor");
   AddFigure(app, "--alpha2", material.alpha2_per_s, "Damping proportional to mass, 1/s");
   app.add_option("--loss-factor", material.loss_factor,
-                 "Damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...")
+                 "Damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...; 0 is no damping but that of "
+                 "--alpha1, --alpha2 and the air")
       ->group("Material");
 }
 

@@ -60,6 +60,17 @@ TEST(ResolveMaterial, ALossFactorReplacesThatOfThePreset) {
   EXPECT_EQ(resolved->loss_factor(0).loss_factor(), 0.01);
 }
 
+TEST(ResolveMaterial, ALossFactorOfZeroDampsNothing) {
+  v1::Material material = Preset("porcelain");
+  SetLossFactor(std::vector<LossFactorPoint>{{1000, 0}}, material);
+  const absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_EQ(DecayRatePerS(*resolved, 440), 0);
+  // The interpolation is logarithmic, so that zero has no place in a table.
+  SetLossFactor(std::vector<LossFactorPoint>{{500, 0}, {1000, 0.01}}, material);
+  EXPECT_FALSE(ResolveMaterial(material).ok());
+}
+
 TEST(ResolveMaterial, RayleighDampingReplacesTheLossFactorOfThePreset) {
   v1::Material material = Preset("porcelain");
   material.set_alpha1_s(1e-7);
@@ -101,8 +112,10 @@ TEST(ResolveMaterial, ALossFactorStandsInForRayleighDamping) {
 TEST(ResolveMaterial, RefusesALossFactorThatIsOutOfRangeOrNotAscending) {
   v1::Material material;
   material.set_preset("chime_aluminum");
-  for (const std::vector<LossFactorPoint>& points :
-       {std::vector<LossFactorPoint>{{500, 0}}, {{500, 2}}, {{0, 0.1}}, {{500, 0.1}, {500, 0.1}}}) {
+  for (const std::vector<LossFactorPoint>& points : {std::vector<LossFactorPoint>{{500, -0.1}},
+                                                     {{500, 2}},
+                                                     {{0, 0.1}},
+                                                     {{500, 0.1}, {500, 0.1}}}) {
     SetLossFactor(points, material);
     EXPECT_THAT(ResolveMaterial(material).status().ToString(), HasSubstr("INVALID_MATERIAL: "));
   }

@@ -99,7 +99,7 @@ def resolved(given: material_pb2.Material, known: dict[str, material_pb2.Materia
 
 def loss_factor_at(given: material_pb2.Material, frequency_hz: numpy.ndarray) -> numpy.ndarray:
     """Interpolates log eta linearly over log frequency; eta is constant outside the table."""
-    if not given.loss_factor:
+    if not given.loss_factor or not given.loss_factor[0].loss_factor:  # where one is zero, all are
         return numpy.zeros_like(frequency_hz)
     table = numpy.log([(point.frequency_hz, point.loss_factor) for point in given.loss_factor])
     return numpy.exp(numpy.interp(numpy.log(frequency_hz), table[:, 0], table[:, 1]))
