@@ -26,6 +26,8 @@ namespace carillon::wind_chimes {
 namespace {
 
 constexpr char kMaterial[] = "chime_aluminum";
+/// The chimes are those of the paper, and all of them sound alike from the first contact on.
+constexpr v1::RadiationModel kRadiation = v1::RADIATION_MODEL_PAPER_COUPLING;
 
 struct PlayOptions {
   std::string server = DefaultServerAddress();
@@ -89,6 +91,7 @@ class LiveScene {
       tube.set_modal_model(options.models[i]);
       tube.mutable_material()->set_preset(kMaterial);
       tube.set_gain(options.gain);
+      tube.set_radiation(kRadiation);
       tube.set_handle(static_cast<uint32_t>(i + 1));
     }
     if (const auto added = client_->AddObjects(tubes); !added.ok()) return added.status();
@@ -116,6 +119,7 @@ absl::StatusOr<client::ContactTraceWriter> BeginTrace(const PlayOptions& options
     object.set_modal_model(options.models[i]);
     object.mutable_material()->set_preset(kMaterial);
     object.set_gain(options.gain);
+    object.set_radiation(kRadiation);
     object.set_label(kTubes[i].note);
     trace->Write(object);
   }
