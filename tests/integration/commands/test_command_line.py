@@ -200,7 +200,7 @@ class ReportTest(CommandLineTest):
         self.assertIn("MODELS_FAILED: 2 of 4 files", done.stderr)
         rows = [json.loads(line) for line in table.read_text().splitlines()]
         self.assertEqual([row["file"] for row in rows], [str(self.folder / name) for name in names])
-        self.assertEqual([row["error"]["reason"] for row in rows[1::2]], ["MESH_EMPTY", "MESH_FILE_NOT_READABLE"])
+        self.assertEqual([row["error"]["reason"] for row in rows[1::2]], ["MESH_EMPTY", "FILE_NOT_FOUND"])
         for row in rows[::2]:
             shown = self.json_of("model", "show", row["modal_model"])
             self.assertEqual((row["frequencies_hz"], row["t60_s"]), (shown["frequencies_hz"], shown["t60_s"]))
