@@ -53,16 +53,3 @@ def check(folder, K, M, low_hz, high_hz):
         mass * quotient, axis=0)
     gram = x.T @ mass - numpy.eye(len(kept))
     return Checked(hertz[kept], x, residual.max(initial=0), numpy.abs(gram).max(initial=0))
-
-
-def best_overlap(shapes, reference, M, frequencies_hz):
-    """The largest 1 - MAC of two programs' modes. Modes nearer than 1e-4 in frequency span one space, which
-    each program spans in its own way: of those the angle between the spaces counts."""
-    overlap = shapes.T @ (M @ reference)
-    worst, first = 0.0, 0
-    for m in range(1, len(frequencies_hz) + 1):
-        if m < len(frequencies_hz) and frequencies_hz[m] < frequencies_hz[m - 1] * (1 + 1e-4):
-            continue
-        smallest = numpy.linalg.svd(overlap[first:m, first:m], compute_uv=False)[-1]
-        worst, first = max(worst, 1 - smallest**2), m
-    return worst

@@ -16,7 +16,7 @@ from carillon import checks, errors, forks
 from carillon.address import default_server, is_local
 from carillon.faces import Block
 from carillon.v1 import (
-    admin_service_pb2_grpc, audio_service_pb2_grpc, contact_service_pb2_grpc, decomposition_service_pb2_grpc,
+    audio_service_pb2_grpc, contact_service_pb2_grpc, decomposition_service_pb2_grpc,
     material_pb2, modal_model_service_pb2_grpc, scene_service_pb2_grpc, server_service_pb2_grpc)
 
 Result = TypeVar("Result")
@@ -92,10 +92,6 @@ class Connection(Block):
     @functools.cached_property
     def server_stub(self) -> Any:
         return server_service_pb2_grpc.ServerServiceStub(self._channel)
-
-    @functools.cached_property
-    def admin_stub(self) -> Any:
-        return admin_service_pb2_grpc.AdminServiceStub(self._channel)
 
     def forget(self) -> None:
         """Opens another channel at the next call, as in a process that was forked."""
