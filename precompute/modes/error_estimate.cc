@@ -191,7 +191,7 @@ class Estimator {
         integrals_(mesh.nodes_per_element),
         places_(mesh),
         fixed_(places_.FixedWith(mesh)),
-        weights_(places_.LargestOf(ReentrantWeights(mesh))),
+        weights_(places_.LargestOf(PlaceWeights(mesh))),
         stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
       if (IsCurved(mesh_, e)) {

@@ -18,6 +18,11 @@ namespace {
 /// The distance within which the boundary must turn to act like an edge, in lengths of an element's
 /// edge.
 constexpr double kReach = 2;
+/// The largest angle of the boundary's edges at a node on a flat face, in units of 90 degrees.
+constexpr double kFlat = 0.03;
+/// The aspect of elements up to which a flat wall needs no weight, the power of the aspect with
+/// which the weight rises above it, and the weight of the flattest elements that were compared.
+constexpr double kThinAspect = 3, kThinPower = 0.85, kThinMost = 4;
 /// The angle from which an edge counts by itself only and not as part of a fillet, in units of 90
 /// degrees.
 constexpr double kSharp = 0.5;
@@ -83,6 +88,38 @@ std::vector<double> MeanEdgeLengths(const TetMesh& mesh) {
   return sums;
 }
 
+/// Returns the longest edge of an element, divided by its least height; 1.2 if it is regular.
+double Aspect(const TetMesh& mesh, const int32_t* corners) {
+  double longest = 0, largest_area = 0;
+  for (const auto& [a, b] : kTetEdges) {
+    longest = std::max(longest, Norm(Difference(At(mesh, corners[a]), At(mesh, corners[b]))));
+  }
+  for (const auto& [a, b, c] : kTetFaces) {
+    const Point first = At(mesh, corners[a]);
+    const Point normal =
+        Cross(Difference(At(mesh, corners[b]), first), Difference(At(mesh, corners[c]), first));
+    largest_area = std::max(largest_area, Norm(normal) / 2);
+  }
+  const double volume = TetVolume(At(mesh, corners[0]), At(mesh, corners[1]), At(mesh, corners[2]),
+                                  At(mesh, corners[3]));
+  return longest * largest_area / (3 * volume);
+}
+
+/// Returns the least aspect of the elements at each node, which is large in a thin wall only: where
+/// several elements lie between two faces, some are compact. Mid-side nodes have infinity.
+std::vector<double> LeastAspects(const TetMesh& mesh) {
+  std::vector<double> least(mesh.nodes.size(), HUGE_VAL);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
+    const double aspect = Aspect(mesh, corners);
+    for (size_t i = 0; i < 4; ++i) {
+      double& at_node = least[static_cast<size_t>(corners[i])];
+      at_node = std::min(at_node, aspect);
+    }
+  }
+  return least;
+}
+
 /// Sums the angles of the boundary's edges near a node.
 class Turning {
  public:
@@ -132,15 +169,18 @@ class Turning {
 
 }  // namespace
 
-std::vector<double> ReentrantWeights(const TetMesh& mesh) {
+std::vector<double> PlaceWeights(const TetMesh& mesh) {
   const std::vector<BentEdge> edges = BentEdges(mesh);
-  std::vector<double> sharpest(mesh.nodes.size());
+  std::vector<double> sharpest(mesh.nodes.size()), most_bent(mesh.nodes.size());
   for (const BentEdge& edge : edges) {
     for (const int32_t node : {edge.first, edge.second}) {
       double& angle = sharpest[static_cast<size_t>(node)];
       angle = std::max(angle, edge.angle);
+      double& bent = most_bent[static_cast<size_t>(node)];
+      bent = std::max(bent, std::abs(edge.angle));
     }
   }
+  const std::vector<double> aspects = LeastAspects(mesh);
   const std::vector<double> lengths = MeanEdgeLengths(mesh);
   Turning turning(mesh, edges);
   std::vector<double> weights(mesh.nodes.size(), 1);
@@ -148,6 +188,9 @@ std::vector<double> ReentrantWeights(const TetMesh& mesh) {
     if (lengths[n] == 0) continue;  // a mid-side node
     const double around = turning.Around(static_cast<int32_t>(n), kReach * lengths[n]);
     weights[n] += std::min(std::max(std::sqrt(sharpest[n]), around), 1.0);
+    if (mesh.nodes_per_element != 10 || most_bent[n] > kFlat) continue;
+    const double thin = std::pow(aspects[n] / kThinAspect, kThinPower);
+    weights[n] = std::max(weights[n], std::min(thin, kThinMost));
   }
   return weights;
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stated errors of frequencies beside true ones, on twelve bodies, of which six have re-entrant corners."""
+"""Stated errors of frequencies beside true ones, on eighteen bodies: six have re-entrant corners, and six are thin
+and flat."""
 
 import dataclasses
 import math
@@ -90,6 +91,16 @@ def frame():
                  lambda i, j, k: (i, j) != (1, 1))
 
 
+def perforated_plate():
+    """Square holes of 20 mm in cells of 30 mm."""
+    xs, ys = ([*(.001 * (30 * i + x) for i in range(count) for x in (0, 5, 25)), .03 * count] for count in (6, 4))
+    return union(xs, ys, millimetres(0, 2), lambda i, j, k: not i % 3 == j % 3 == 1)
+
+
+def disc(inner, outer, thickness, around):
+    return bodies.lathe([(inner, 0), (outer, 0), (outer, thickness), (inner, thickness)], around)
+
+
 @dataclasses.dataclass
 class Body:
     name: str
@@ -110,6 +121,12 @@ BODIES = [
     Body("stepped shaft", stepped_shaft),
     Body("frame", frame),
     Body("gear", lambda: users.gear(teeth=12, inner=.03, outer=.04, height=.008)),
+    Body("disc, 1 mm", lambda: disc(0, .08, .001, 64)),
+    Body("disc, 2 mm", lambda: disc(0, .1, .002, 48)),
+    Body("ring", lambda: disc(.05, .1, .002, 48)),
+    Body("slat", users.block(.2, .02, .001)),
+    Body("square plate", users.block(.1, .1, .001)),
+    Body("perforated plate", perforated_plate),
 ]
 
 

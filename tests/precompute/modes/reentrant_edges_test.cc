@@ -29,15 +29,15 @@ bool IsOnInnerEdge(const Point& p) {
   return std::abs(p[0] - kWallM) < 1e-9 && std::abs(p[1] - kWallM) < 1e-9;
 }
 
-TEST(ReentrantWeights, AreNoneOfAConvexBody) {
-  for (const double value : ReentrantWeights(MakeTetBox({1, 2, 3}, {2, 3, 4}, 4))) {
+TEST(PlaceWeights, AreNoneOfAConvexBody) {
+  for (const double value : PlaceWeights(MakeTetBox({1, 2, 3}, {2, 3, 4}, 4))) {
     EXPECT_EQ(value, 1);
   }
 }
 
-TEST(ReentrantWeights, AreThoseOfTheInnerEdgeOfAnAngle) {
+TEST(PlaceWeights, AreThoseOfTheInnerEdgeOfAnAngle) {
   const TetMesh mesh = Angle(2);
-  const std::vector<double> values = ReentrantWeights(mesh);
+  const std::vector<double> values = PlaceWeights(mesh);
   ASSERT_EQ(values.size(), mesh.nodes.size());
   int count = 0;
   for (size_t e = 0; e < mesh.element_count(); ++e) {
@@ -65,7 +65,7 @@ TetMesh BentPlate(double inner_radius_m) {
 /// The weights in the middle of the inner side and of the outer side of BentPlate().
 std::pair<double, double> InnerAndOuterWeight(double inner_radius_m) {
   const TetMesh mesh = BentPlate(inner_radius_m);
-  const std::vector<double> weights = ReentrantWeights(mesh);
+  const std::vector<double> weights = PlaceWeights(mesh);
   const auto at = [&](double radius) {
     const Point sought = {radius * std::sqrt(0.5), -radius * std::sqrt(0.5), 0.01};
     const auto near = [&](const Point& p) { return Norm(Difference(p, sought)); };
@@ -76,7 +76,7 @@ std::pair<double, double> InnerAndOuterWeight(double inner_radius_m) {
   return {at(inner_radius_m), at(inner_radius_m + 0.004)};
 }
 
-TEST(ReentrantWeights, OfAFilletRiseWithWhatItTurnsWithinTwoElements) {
+TEST(PlaceWeights, OfAFilletRiseWithWhatItTurnsWithinTwoElements) {
   const auto [narrow, outside] = InnerAndOuterWeight(0.001);
   EXPECT_GT(narrow, 1.6);
   EXPECT_EQ(outside, 1);
@@ -86,6 +86,41 @@ TEST(ReentrantWeights, OfAFilletRiseWithWhatItTurnsWithinTwoElements) {
   EXPECT_LT(wide, middle);
   // Each edge turns by a twelfth of a right angle.
   EXPECT_GE(wide, 1 + std::sqrt(1.0 / 12) - 1e-9);
+}
+
+TEST(PlaceWeights, RiseWithTheWidthOfElementsInAFlatWall) {
+  const auto greatest = [](double thickness_m) {
+    return std::ranges::max(PlaceWeights(MakeTetBox({1, 1, thickness_m}, {4, 4, 1}, 10)));
+  };
+  EXPECT_EQ(greatest(0.25), 1);
+  const double four = greatest(0.25 / 4), eight = greatest(0.25 / 8);
+  EXPECT_GT(four, 1.4);
+  EXPECT_LT(four, 2.5);
+  EXPECT_GT(eight, 1.6 * four);
+}
+
+/// The first modes of a square plate whose elements are four times as wide as high.
+TEST(ErrorEstimate, CoversTheErrorsOfAThinPlate) {
+  constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
+  constexpr double kLimit = 0.5;
+  const auto solve = [&](const TetMesh& mesh, double limit) {
+    auto solution = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent),
+                                          mesh.nodes, limit, [](SolveStage, double) {});
+    EXPECT_TRUE(solution.ok()) << solution.status();
+    return *std::move(solution);
+  };
+  constexpr Point kPlate = {1, 0.75, 0.03125};
+  const TetMesh mesh = MakeTetBox(kPlate, {8, 6, 1}, 10);
+  const DeformationModes fine = solve(MakeTetBox(kPlate, {24, 18, 1}, 10), kLimit);
+  const DeformationModes coarse = solve(mesh, 1.3 * kLimit);
+  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes).errors;
+  ASSERT_GE(fine.modes.eigenvalues.size(), 6);
+  ASSERT_GE(errors.size(), 6);
+  for (Eigen::Index m = 0; m < 6; ++m) {
+    const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
+    EXPECT_GT(errors[m], right) << "mode " << m;
+    EXPECT_LT(errors[m], 2.5 * right) << "mode " << m << ", in truth " << right;
+  }
 }
 
 TEST(ErrorEstimate, CoversTheErrorsOfABodyWithAReentrantEdge) {
