@@ -97,7 +97,8 @@ absl::StatusOr<std::optional<std::string>> ZipReader::Read(const std::string& na
     bytes.resize(before + static_cast<size_t>(std::max<zip_int64_t>(got, 0)));
   }
   if (bytes.size() > kMostBytes) return TooLarge(absl::StrCat(name, " has over 4 GiB"));
-  if (got < 0) return Malformed(absl::StrCat(name, " in the .npz file is damaged"));
+  if (got < 0)
+    return Malformed(absl::StrCat(name, " in the .npz file is damaged; copy or export it again"));
   return bytes;
 }
 

@@ -98,7 +98,7 @@ RitzPairs FindRitzPairs(const LanczosRecurrence<Real>& recurrence, Index wanted)
 absl::Status NotConverged(int converged, Index wanted) {
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                  absl::StrCat("the eigenvalue iteration found ", converged, " of ", wanted,
-                              " modes; another number of nodes may do"));
+                              " modes; try a tenth more nodes (--nodes)"));
 }
 
 /// Steps until `wanted` Ritz pairs have converged.

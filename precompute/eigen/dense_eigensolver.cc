@@ -26,7 +26,7 @@ absl::StatusOr<Modes> DenseEigensolver::Solve(const SystemMatrices& system,
     if (info != 0) {
       return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                      absl::StrCat("the dense eigensolver ended with code ", info,
-                                  "; another number of nodes may do"));
+                                  "; try a tenth more nodes (--nodes)"));
     }
     return Modes{.eigenvalues = eigenvalues.head(request.count),
                  .shapes = K.leftCols(request.count)};

@@ -259,7 +259,7 @@ absl::StatusOr<RefinedModes> RefineModes(const NodeMatrix& A,
   }
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                  absl::StrCat("modes could be found to a relative residual of ", residual,
-                              " only; another number of nodes may do"));
+                              " only; try a tenth more nodes (--nodes)"));
 }
 
 template absl::StatusOr<RefinedModes> RefineModes(

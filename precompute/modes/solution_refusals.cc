@@ -24,7 +24,7 @@ constexpr int kMostSlender = 500;
 
 absl::Status VerificationFailed(const std::string& what) {
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
-                 absl::StrCat(what, "; no model was made; another number of nodes may do"));
+                 absl::StrCat(what, "; no model was made; try a tenth more nodes (--nodes)"));
 }
 
 absl::Status TooManyModes(int count, int limit) {

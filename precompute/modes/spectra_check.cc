@@ -63,7 +63,7 @@ class ShiftedInverse {
 absl::Status NotConverged(int count) {
   return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
                  absl::StrCat("Spectra's iteration for ", count,
-                              " modes did not converge; another number of nodes may do"));
+                              " modes did not converge; try a tenth more nodes (--nodes)"));
 }
 
 absl::Status TooFewUnknowns(const SystemMatrices& system, int count) {

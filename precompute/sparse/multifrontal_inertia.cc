@@ -14,9 +14,10 @@ namespace carillon::precompute {
 namespace {
 
 absl::Status VanishingPivot() {
-  return Refusal(
-      absl::StatusCode::kInternal, "VERIFICATION_FAILED",
-      "a pivot vanished while eigenvalues were counted: the shift lies on an eigenvalue");
+  return Refusal(absl::StatusCode::kInternal, "VERIFICATION_FAILED",
+                 "a pivot vanished while eigenvalues were counted: the shift lies on an "
+                 "eigenvalue; try a tenth "
+                 "more nodes (--nodes)");
 }
 
 }  // namespace

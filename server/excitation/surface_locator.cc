@@ -291,10 +291,10 @@ absl::StatusOr<LocatedPoint> SurfaceLocator::Nearest(const Point& point) const {
                 .point = point,
                 .given_triangle = std::nullopt};
   if (index_->Run(search)) return index_->Describe(search);
-  return Refusal(
-      absl::StatusCode::kInvalidArgument, "CONTACT_MALFORMED",
-      "the point of contact is too far away to tell what is nearest to it: send metres in "
-      "the object's frame");
+  return Refusal(absl::StatusCode::kInvalidArgument, "CONTACT_MALFORMED",
+                 absl::StrCat("the point of contact ", point[0], ",", point[1], ",", point[2],
+                              " m is too far away to tell what is nearest to it: send metres in "
+                              "the object's frame"));
 }
 
 absl::StatusOr<LocatedPoint> SurfaceLocator::OnGivenTriangle(const SurfacePoint& at) const {

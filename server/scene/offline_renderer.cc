@@ -211,9 +211,11 @@ void OfflineRenderer::PushEventsBefore(uint64_t frame) {
     if (event.FirstSample() >= frame + ahead_frame_count_) return;
     if (!stream_->TryPush(event)) {
       if (event.FirstSample() >= frame) return;
-      intake_.Reject(1, Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
-                                absl::StrCat("over ", kOfflineQueueCapacity,
-                                             " events fall into one block; render fewer objects")));
+      intake_.Reject(
+          1, Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
+                     absl::StrCat("over ", kOfflineQueueCapacity, " events fall into the block at ",
+                                  static_cast<double>(frame) / settings_.sample_rate_hz,
+                                  " s of the sound; render fewer objects")));
     }
     ++pushed_count_;
   }

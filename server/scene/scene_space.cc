@@ -27,7 +27,7 @@ Place PlaceOf(const Pose& pose) {
 absl::Status Validate(const SceneSpace& space) {
   if (space.hearing.near_field && !space.hearing.directivity) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
-                   "near_field needs directivity, whose gains it changes: set both");
+                   "near_field works only with directivity, whose gains it changes: set both");
   }
   absl::Status status =
       InRange("reference_distance_m", space.hearing.reference_distance_m, 0.01, 1000);

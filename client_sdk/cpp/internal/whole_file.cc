@@ -31,7 +31,7 @@ constexpr char kUnfinished[] = "-unfinished-";
 
 absl::Status NotWritable(const std::string& path, absl::string_view why) {
   return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(path, " cannot be written: ", why));
+                 absl::StrCat(path, " cannot be written: ", why, "; choose another file"));
 }
 
 absl::Status InUse(const std::string& path, const std::string& companion) {

@@ -54,7 +54,7 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   absl::Status Take(const v1::StreamContactsRequest& request) override {
     if (!request.has_start() && request.steps().empty()) {
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
-                     "a request has neither start nor steps");
+                     "a request of the stream is empty: set start, or steps");
     }
     if (request.has_start()) RETURN_IF_ERROR(Open(request.start()));
     for (const v1::ContactStep& step : request.steps()) RETURN_IF_ERROR(Step(step));

@@ -37,7 +37,7 @@ uint64_t ElementBytes(v1::ElementType type) {
 
 absl::Status Malformed(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
-                 absl::StrCat("the stored model is not of format version 1: ", what,
+                 absl::StrCat("the records of the model are damaged: ", what,
                               "; write it anew with carillon-precompute or by an export"));
 }
 

@@ -44,7 +44,7 @@ constexpr uint32_t kLeastBadHarmonic = 601 * 601;
 
 absl::Status Malformed(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
-                 absl::StrCat("the stored transfer is not of format version 1: ", what,
+                 absl::StrCat("the records of the transfer are damaged: ", what,
                               "; write it anew with carillon-precompute or by an export"));
 }
 
