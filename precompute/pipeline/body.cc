@@ -99,7 +99,9 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
                    ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
   const double extent_m = ExtentOf(read.mesh);
   observer.OnExtent(UseOf(request).size * extent_m);
-  RETURN_IF_ERROR(CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request)));
+  const absl::Status unit = CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request));
+  if (request.max_frequency_hz() > 0) RETURN_IF_ERROR(unit);
+  if (!unit.ok()) read.warnings.push_back(ToErrorInfo(unit).message());
   observer.OnProgress(v1::PHASE_MESH, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
     ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names, request));

@@ -34,9 +34,9 @@ absl::Status CheckUnit(double extent_m, double metres_per_unit, const IntendedUs
   }
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MESH_UNIT_UNCLEAR",
-      absl::StrFormat("the body is %.4g m long if the file's unit is the metre: give the unit of "
-                      "the file (--unit mm), or, if the body is so large, a band up to at most "
-                      "%.3g Hz",
+      absl::StrFormat("the body is %.4g m long, because the file's lengths are read as metres: if "
+                      "they are not, give the unit of the file (--unit mm); if they are, a band up "
+                      "to at most %.3g Hz suits it, or none (--band)",
                       extent_m, highest_hz));
 }
 
