@@ -37,7 +37,7 @@ void ProgressReporter::OnProgress(v1::Phase phase, double fraction) {
   state_.set_phase(phase);
   state_.set_fraction(std::max(state_.fraction(), FractionByPhase(phase)));
   counted_ = counted_ || phase == v1::PHASE_FACTOR || phase == v1::PHASE_SOLVE;
-  remaining_.Progress(Now(), phase, fraction);
+  remaining_.Progress(WorkedSeconds(), phase, fraction);
   Estimate();
   if (phase != v1::PHASE_WRITE || fraction < 1) return;
   remaining_ = {};
@@ -47,25 +47,28 @@ void ProgressReporter::OnProgress(v1::Phase phase, double fraction) {
 
 void ProgressReporter::OnRound(const RoundForecast& forecast) {
   const MutexLock lock(mutex_);
-  remaining_.BeginRound(Now(), forecast);
+  remaining_.BeginRound(WorkedSeconds(), forecast);
 }
 
 void ProgressReporter::OnPlan(const std::vector<PlannedStep>& steps) {
   const MutexLock lock(mutex_);
-  remaining_.Plan(Now(), steps);
+  remaining_.Plan(WorkedSeconds(), steps);
 }
 
 void ProgressReporter::Estimate() {
-  const double now_s = Now();
+  const double now_s = WorkedSeconds();
   const std::optional<double> remaining_s = remaining_.Seconds(now_s);
-  state_.set_remaining_s(remaining_s.value_or(0));
+  state_.set_remaining_s(remaining_s.value_or(0) * work_.Slowdown());
   if (!remaining_s) return;
   const double done = now_s / std::max(now_s + *remaining_s, 1e-9);
   state_.set_fraction(
       std::max(state_.fraction(), counted_ ? done : std::min(done, kMostBeforeCount)));
 }
 
-double ProgressReporter::Now() const { return PhaseClock::Now().seconds - begun_s_; }
+double ProgressReporter::WorkedSeconds() {
+  work_.Advance(WorkClock::Now());
+  return work_.seconds();
+}
 
 void ProgressReporter::OnExtent(double extent_m) {
   const MutexLock lock(mutex_);

@@ -10,6 +10,7 @@
 #include "precompute/pipeline/decomposition_observer.h"
 #include "precompute/pipeline/phase_clock.h"
 #include "precompute/program/remaining_time.h"
+#include "precompute/program/work_clock.h"
 #include "precompute/sparse/mutex.h"
 
 namespace carillon::precompute {
@@ -39,7 +40,8 @@ class ProgressReporter : public DecompositionObserver {
 
  private:
   void Run();
-  double Now() const;
+  /// Returns the seconds that the process has worked.
+  double WorkedSeconds() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   /// Updates the fraction and the remaining time.
   void Estimate() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
@@ -50,9 +52,9 @@ class ProgressReporter : public DecompositionObserver {
   v1::Progress state_ ABSL_GUARDED_BY(mutex_);
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
   PhaseClock clock_;  ///< changed under mutex_ until Stop, and constant afterwards
-  const double begun_s_ = PhaseClock::Now().seconds;
-  RemainingTime remaining_ ABSL_GUARDED_BY(mutex_);
-  bool counted_ ABSL_GUARDED_BY(mutex_) = false;  ///< whether the number of modes is known
+  WorkClock work_ ABSL_GUARDED_BY(mutex_);
+  RemainingTime remaining_ ABSL_GUARDED_BY(mutex_);  ///< in seconds of work
+  bool counted_ ABSL_GUARDED_BY(mutex_) = false;     ///< whether the number of modes is known
   std::thread thread_;
 };
 

@@ -22,10 +22,11 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// The niceness of decompositions and of transfers. A processor that both use gives seven eighths of
-// its time to the decomposition.
-constexpr int kDecompositionNice = 10;
-constexpr int kTransferNice = 19;
+// The niceness of decompositions and of transfers. A processor that another program keeps busy
+// gives a quarter of its time to a decomposition, or a tenth to a transfer, so that both end. A
+// processor that both use gives three quarters to the decomposition.
+constexpr int kDecompositionNice = 5;
+constexpr int kTransferNice = 10;
 
 constexpr size_t kReadBytes =
     256 << 10;  // at a time, so that one flooding worker does not hold all
