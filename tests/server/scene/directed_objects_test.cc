@@ -122,7 +122,7 @@ TEST_F(DirectedObjects, AreAsLoudAsTheyRadiateTowardsTheListener) {
 TEST_F(DirectedObjects, NearFieldWithoutDirectivityIsRefused) {
   EXPECT_THAT(
       scenes_.CreateScene({.hearing = {.near_field = true}, .listener = {}}).status().ToString(),
-      testing::HasSubstr("INVALID_SETTINGS: near_field needs directivity"));
+      testing::HasSubstr("INVALID_SETTINGS: near_field works only with directivity"));
 }
 
 /// The object turns and walks, the listener walks round, and there is a strike in every third step.
