@@ -112,7 +112,7 @@ void SyncFolder(const std::string& file) {
 absl::StatusOr<WholeFile> WholeFile::Create(const std::string& path) {
   std::error_code ignored;
   const fs::file_type type = fs::status(path, ignored).type();
-  if (type == fs::file_type::directory) return NotWritable(path, "it is a folder; name a file");
+  if (type == fs::file_type::directory) return NotWritable(path, "it is a folder");
   const fs::path found = Follow(path);
   const bool has_place = type == fs::file_type::regular || type == fs::file_type::not_found;
   // A device or a pipe, or a file that a process has open, takes the bytes at once.

@@ -193,7 +193,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         piped = subprocess.run([BIN / "carillon", "--server", self.daemon.server, "db", "backup", "/dev/stdout"],
                                capture_output=True, check=True)
         self.assertEqual(piped.stdout[:16], b"SQLite format 3\0")
-        for target, why in ((self.folder, "it is a folder; name a file"),
+        for target, why in ((self.folder, "it is a folder; choose another file"),
                             (self.folder / "none/backup.db", f"the folder {self.folder}/none does not exist"),
                             ("/dev/full", "No space left on device")):
             refused = self.daemon.command("db", "backup", target, check=False)
