@@ -109,6 +109,9 @@ absl::Status Complete(StoredModel& model) {
   if (static_cast<size_t>(header.estimated_errors_size()) != model.mode_count()) {
     header.clear_estimated_errors();
   }
+  if (static_cast<size_t>(header.poisson_slopes_size()) != model.mode_count()) {
+    header.clear_poisson_slopes();
+  }
   return absl::OkStatus();
 }
 

@@ -93,6 +93,7 @@ v1::ModalModelHeader HeaderOf(const StoredModel& model, const std::vector<Soundi
   header.add_warnings(
       absl::StrCat("an export to glTF left out ", missing, " modes that its material overdamps"));
   header.clear_estimated_errors();
+  header.clear_poisson_slopes();
   std::vector<bool> kept(model.mode_count(), false);
   for (const SoundingMode& mode : modes) kept[mode.column] = true;
   const auto first = std::ranges::find(kept, false) - kept.begin();

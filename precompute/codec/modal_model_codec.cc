@@ -69,6 +69,7 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   for (const double error : model.estimated_errors) {
     header.add_estimated_errors(static_cast<float>(error));
   }
+  header.mutable_poisson_slopes()->Assign(model.poisson_slopes.begin(), model.poisson_slopes.end());
   return record;
 }
 

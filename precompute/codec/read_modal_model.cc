@@ -102,6 +102,7 @@ class ModelReader {
     model.warnings.assign(header.warnings().begin(), header.warnings().end());
     model.estimated_errors.assign(header.estimated_errors().begin(),
                                   header.estimated_errors().end());
+    model.poisson_slopes.assign(header.poisson_slopes().begin(), header.poisson_slopes().end());
     model.estimated_errors.resize(header.mode_count(), std::numeric_limits<double>::quiet_NaN());
   }
 

@@ -57,8 +57,8 @@ std::vector<double> Audibilities(const ModalModel& model) {
 void KeepModes(const std::vector<size_t>& kept, ModalModel& model) {
   const size_t found = model.eigenvalues.size();
   PickColumns(kept, found, model.shapes);
-  for (auto* values :
-       {&model.eigenvalues, &model.residuals, &model.couplings, &model.estimated_errors}) {
+  for (auto* values : {&model.eigenvalues, &model.residuals, &model.couplings,
+                       &model.estimated_errors, &model.poisson_slopes}) {
     Pick(kept, *values);
   }
   model.left_out_mode_count += static_cast<int>(found - kept.size());

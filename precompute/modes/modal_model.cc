@@ -7,6 +7,7 @@
 #include "precompute/mesh/sounding_surface.h"
 #include "precompute/modes/coupling.h"
 #include "precompute/modes/error_estimate.h"
+#include "precompute/modes/poisson_slopes.h"
 
 namespace carillon::precompute {
 namespace {
@@ -64,6 +65,7 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                    .residuals = ToVector(solution.residuals),
                    .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
                    .estimated_errors = ToVector(estimate.errors),
+                   .poisson_slopes = ToVector(PoissonSlopes(mesh, elastic, solution.modes)),
                    .error_at_node = std::move(estimate.at_node),
                    .vertices = {},
                    .triangles = std::move(surface.triangles),

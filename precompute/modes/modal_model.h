@@ -41,6 +41,7 @@ struct ModalModel {
   std::vector<double> couplings;    ///< #modes, see Couplings
   /// #modes, see EstimateFrequencyErrors.
   std::vector<double> estimated_errors;
+  std::vector<double> poisson_slopes;  ///< #modes, see PoissonSlopes
   /// #nodes of the mesh, see ErrorEstimate::at_node. Not stored.
   std::vector<double> error_at_node;
 

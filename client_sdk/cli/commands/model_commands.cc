@@ -160,6 +160,7 @@ void Shorten(v1::ModalModelSummary& model) {
   model.mutable_header()->clear_verification();
   model.mutable_header()->clear_arrays();
   model.mutable_header()->clear_estimated_errors();
+  model.mutable_header()->clear_poisson_slopes();
 }
 
 }  // namespace

@@ -58,6 +58,14 @@ absl::Status CheckFigures(const v1::ModalModelHeader& header) {
     return Impossible(kReason, "one of estimated_errors", "negative or not finite",
                       "a finite number that is not negative");
   }
+  const auto& slopes = header.poisson_slopes();
+  if (!slopes.empty() && static_cast<uint32_t>(slopes.size()) != header.mode_count()) {
+    return Impossible(kReason, "the number of poisson_slopes", absl::StrCat(slopes.size()),
+                      absl::StrCat("that of the modes, ", header.mode_count(), ", or 0"));
+  }
+  if (!std::ranges::all_of(slopes, [](double slope) { return std::isfinite(slope); })) {
+    return Impossible(kReason, "one of poisson_slopes", "not finite", "a finite number");
+  }
   return CheckDigest(kReason, header.mesh_digest());
 }
 

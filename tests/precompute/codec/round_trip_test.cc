@@ -34,6 +34,7 @@ ModalModel SmallModel() {
   model.residuals = {1e-9, 2e-9, 3e-9};
   model.couplings = {-0.1, 0.2, 1e-300};
   model.estimated_errors = {0.01, 0.02, 0.5};
+  model.poisson_slopes = {-0.1, 1.0 / 3, 1.2};
   model.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0.1F}};
   model.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
   model.given_triangle = {3, 2, 1, 0};
@@ -81,6 +82,7 @@ TEST_F(RoundTripTest, KeepsEveryFigureOfAModelAndItsOrigin) {
   for (size_t m = 0; m < 3; ++m) {
     EXPECT_EQ(read.estimated_errors[m], static_cast<float>(model.estimated_errors[m]));
   }
+  EXPECT_EQ(read.poisson_slopes, model.poisson_slopes);
   EXPECT_EQ(stored->origin.mesh_digest, "4f");
   EXPECT_EQ(stored->origin.settings.SerializeAsString(), origin.settings.SerializeAsString());
 }

@@ -81,6 +81,7 @@ ModalModel ThreeModes() {
   model.residuals = {0.1, 0.2, 0.3};
   model.couplings = {1, 20, 6};
   model.estimated_errors = {0.01, 0.02, 0.03};
+  model.poisson_slopes = {-0.5, 0.5, 1.5};
   model.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   model.triangles = {{0, 1, 2}};
   for (int row = 0; row < 9; ++row) {
@@ -97,6 +98,7 @@ TEST(KeepMostAudible, LeavesOutTheLeastAudibleAndSaysSo) {
   EXPECT_THAT(model.residuals, ElementsAre(0.2, 0.3));
   EXPECT_THAT(model.couplings, ElementsAre(20, 6));
   EXPECT_THAT(model.estimated_errors, ElementsAre(0.02, 0.03));
+  EXPECT_THAT(model.poisson_slopes, ElementsAre(0.5, 1.5));
   ASSERT_EQ(model.shapes.size(), 18U);
   EXPECT_EQ(model.shapes[0], 1);
   EXPECT_EQ(model.shapes[17], 82);

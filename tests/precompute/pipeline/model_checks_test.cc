@@ -29,6 +29,7 @@ ModalModel ModelWith(const std::vector<double>& frequencies_hz, const std::vecto
   model.vertices = {{0, 0, 0}};
   for (const double hz : frequencies_hz) model.eigenvalues.push_back(Use().UnitEigenvalue(hz));
   model.estimated_errors = errors;
+  model.poisson_slopes.assign(errors.size(), 0);
   model.residuals.assign(errors.size(), 0);
   model.couplings.assign(errors.size(), 0);
   for (int axis = 0; axis < 3; ++axis) {

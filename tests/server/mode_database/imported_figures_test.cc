@@ -32,6 +32,7 @@ TEST(ImportedFigures, AModelWithKnownOrUnknownFiguresIsTaken) {
   header.set_volume_m3(1e-3);
   header.set_mesh_digest(std::string(64, 'a'));
   for (const float error : {0.0F, 0.1F, 2.0F}) header.add_estimated_errors(error);
+  for (const double slope : {-1.0, 0.0, 1.5}) header.add_poisson_slopes(slope);
   EXPECT_TRUE(CheckFigures(header).ok());
 }
 
@@ -60,6 +61,12 @@ TEST(ImportedFigures, AModelWithAnImpossibleFigureIsRefusedAndTheFigureNamed) {
   }
   EXPECT_THAT(refusal([](auto& header) { header.add_estimated_errors(0.1F); }),
               names("number of estimated_errors in the header is 1"));
+  EXPECT_THAT(refusal([](auto& header) {
+                for (int i = 0; i < 3; ++i) header.add_poisson_slopes(kNan);
+              }),
+              names("poisson_slopes"));
+  EXPECT_THAT(refusal([](auto& header) { header.add_poisson_slopes(0.1); }),
+              names("number of poisson_slopes in the header is 1"));
   EXPECT_THAT(refusal([](auto& header) { header.set_mesh_digest("../../etc/passwd"); }),
               names("mesh_digest"));
 }
