@@ -18,8 +18,9 @@ LICENSED = (".cc", ".h", ".py", ".sh", ".proto", ".js", ".ts")
 BROKEN = (".md", ".proto", ".py", ".sh", ".cmake")
 COLUMNS = 120
 SPELT = (*project.CXX_SUFFIXES, ".md", ".proto", ".py", ".sh", ".toml", ".txt", ".cmake")
-# Right although codespell has them in its list: "to and fro", the journal Numer. Math., and statements of OBJ files.
-RIGHT = "fo,fro,lod,numer,parm,te"
+# Right although codespell has them in its list: the order ACN, "to and fro", the journal Numer. Math., and statements
+# of OBJ files.
+RIGHT = "acn,fo,fro,lod,numer,parm,te"
 PAGE = "ARCHITECTURE.md"
 BEGIN = "<!-- The table of rooms: deploy/lint/check_text.py --write prints it from rooms.toml. -->"
 END = "<!-- The end of the table of rooms. -->"

@@ -116,6 +116,8 @@ class ContactIntake {
   /// Number of times that simulation time was mapped anew.
   uint64_t remap_count() const { return mapper_.remap_count(); }
   uint64_t step_count() const { return step_count_; }
+  /// Returns the frame in which a contact at the time of the newest step is due.
+  double newest_frame() const { return FrameOf(time_s_); }
   /// Returns the time from the target's frame to the newest step's, seconds. It is zero before the
   /// first step, and if the newest step is too far ahead to sound.
   double ahead_s() const;

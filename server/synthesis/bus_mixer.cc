@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "server/synthesis/frames.h"
+#include "server/synthesis/voice/ambisonics.h"
 
 namespace carillon {
 namespace {
@@ -161,7 +162,7 @@ void BusMixer::ApplyGains(Bus& bus) noexcept {
 void BusMixer::LetHear(const Bus& bus, uint64_t first_frame) noexcept {
   BusListener* const listener = bus.listener.load(std::memory_order_acquire);
   if (listener == nullptr) return;
-  std::array<float, 2 * kMostBlockFrames> heard;
+  std::array<float, kMostChannels * kMostBlockFrames> heard;
   const std::span<float> block = std::span(heard).first(block_frame_count_ * channel_count_);
   for (size_t first = 0; first < frames_.size(); first += block_frame_count_) {
     Spread(frames_.subspan(first), channel_count_, block);

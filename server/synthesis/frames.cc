@@ -16,6 +16,11 @@ void Spread(std::span<const float> mono, size_t channel_count, std::span<float> 
     std::ranges::copy(mono.first(frames.size()), frames.begin());
     return;
   }
+  if (channel_count > 2) {
+    std::ranges::fill(frames, 0.0F);
+    for (size_t n = 0; n < frames.size() / channel_count; ++n) frames[channel_count * n] = mono[n];
+    return;
+  }
   for (size_t n = 0; n < frames.size() / 2; ++n) frames[2 * n] = frames[2 * n + 1] = mono[n];
 }
 
@@ -23,6 +28,10 @@ void MultiplyFrames(std::span<const float> gains, size_t channel_count,
                     std::span<float> frames) noexcept {
   if (channel_count == 1) {
     for (size_t n = 0; n < frames.size(); ++n) frames[n] *= gains[n];
+    return;
+  }
+  if (channel_count > 2) {
+    for (size_t i = 0; i < frames.size(); ++i) frames[i] *= gains[i / channel_count];
     return;
   }
   for (size_t n = 0; n < frames.size() / 2; ++n) {

@@ -39,7 +39,9 @@ Mixer::Mixer(const MixerSettings& settings)
   assert(settings.most_buses > 0 && settings.most_buses <= kMostBuses);
   counters_.frame_count = settings.first_frame;
   const size_t thread_count = settings.threads == nullptr ? 1 : settings.threads->size();
-  for (size_t i = 0; i < thread_count; ++i) workspaces_.emplace_back(settings.block_frame_count);
+  for (size_t i = 0; i < thread_count && !settings.shares_workspace; ++i) {
+    workspaces_.emplace_back(settings.block_frame_count);
+  }
 }
 
 Mixer::~Mixer() = default;
@@ -71,7 +73,7 @@ void Mixer::RenderBlocks(std::span<float> frames) noexcept {
   bus_mixer_.EndStops();
   RetireLeavingBanks();
   NotePeak(frames);
-  Count(counters_.limited_frame_count, limiter_.Apply(frames));
+  if (settings_.limits) Count(counters_.limited_frame_count, limiter_.Apply(frames));
   block_start_ += frame_count;
   counters_.frame_count.store(block_start_, std::memory_order_release);
   intake_.End(block_count);
@@ -137,7 +139,7 @@ void Mixer::RenderOneSection(size_t thread, MixedSection& mixed, size_t frame_co
       block_start_ / settings_.block_frame_count, mixed.due,
       {.frames = std::span(mixed.frames).first(frame_count),
        .placed = std::span(mixed.placed).first(frame_count * settings_.channel_count)},
-      workspaces_[thread]);
+      workspace_ != nullptr ? *workspace_ : workspaces_[thread]);
 }
 
 void Mixer::RetireLeavingBanks() noexcept {

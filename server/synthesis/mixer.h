@@ -45,9 +45,16 @@ class Mixer {
   Mixer(const Mixer&) = delete;
   Mixer& operator=(const Mixer&) = delete;
 
-  /// Renders the next frames, interleaved, within +-1. `frames` holds whole blocks of
-  /// block_frame_count.
+  /// Renders the next frames, interleaved, within +-1 unless the settings leave the limiter out.
+  /// `frames` holds whole blocks of block_frame_count.
   void Render(std::span<float> frames) noexcept;
+
+  /// Does the same with a workspace that several mixers use one after the other. The mixer must
+  /// have no threads.
+  void Render(std::span<float> frames, RenderWorkspace& workspace) noexcept {
+    workspace_ = &workspace;
+    Render(frames);
+  }
 
   /// Puts a bank on the mixer; events may be sent to it when the call returns. With a `voice`,
   /// which serves one object, the bank is heard from the object's position and rings in the time
@@ -157,6 +164,7 @@ class Mixer {
   BusMixer bus_mixer_ ABSL_GUARDED_BY(kRenderRole);
   EventIntake intake_ ABSL_GUARDED_BY(kRenderRole);
   std::vector<RenderWorkspace> workspaces_ ABSL_GUARDED_BY(kRenderRole);  // one for each thread
+  RenderWorkspace* workspace_ = nullptr;                                  // the caller's, if any
   Limiter limiter_ ABSL_GUARDED_BY(kRenderRole);
 };
 

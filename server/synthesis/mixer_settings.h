@@ -36,9 +36,11 @@ inline constexpr size_t kMostOthersPerBlock = 16384;
 struct MixerSettings {
   double sample_rate_hz = 48000;
   size_t block_frame_count = 128;  ///< at most kMostBlockFrames
-  size_t channel_count = 1;        ///< or 2; a bank without a voice sounds equally on both
-  uint64_t first_frame = 0;        ///< number of the first frame; a multiple of block_frame_count
-  size_t most_banks = 8192;        ///< including those that ring out or fade
+  /// At most kMostChannels. With two channels a bank without a voice sounds equally on both; with
+  /// more it sounds on the first, the pressure of ambisonics.
+  size_t channel_count = 1;
+  uint64_t first_frame = 0;  ///< number of the first frame; a multiple of block_frame_count
+  size_t most_banks = 8192;  ///< including those that ring out or fade
   size_t most_buses = kMostBuses;
   size_t stagger = 0;  ///< of the default bus; see Mixer::Stagger
   size_t most_streams = 2048;
@@ -55,6 +57,9 @@ struct MixerSettings {
   double gain = 1;         ///< of all buses together, before the limiter
   /// The pressure of a sample of 1. The banks of the mixer are made for it.
   double full_scale_pa = kFullScalePa;
+  bool limits = true;  ///< whether the limiter works
+  /// Whether each call of Render is given a workspace, so that the mixer needs none of its own.
+  bool shares_workspace = false;
   /// Threads that render the sections in parallel. If it is null, the caller's thread renders them
   /// all. The sound is the same bit for bit. The threads must outlive the mixer.
   SectionThreads* threads = nullptr;

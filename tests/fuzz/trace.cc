@@ -42,10 +42,9 @@ void Render(Rooms& rooms, const uint8_t* data, size_t size) {
     if (!reader.Take(request).ok()) return;
     request.Clear();
   }
-  const auto renderer = reader.Finish();
-  if (!renderer.ok()) return;
+  if (!reader.Finish().ok()) return;
   std::array<float, 8 * OfflineRenderer::kBlockFrameCount> samples{};
-  for (int block = 0; block < 48 && (*renderer)->Render(samples) > 0; ++block) {
+  for (int block = 0; block < 48 && reader.renderer()->Render(samples) > 0; ++block) {
     for (const float sample : samples) {
       if (!(sample >= -1 && sample <= 1)) __builtin_trap();
     }

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstddef>
+#include <ranges>
 #include <span>
 #include <utility>
 #include <vector>
@@ -120,22 +122,35 @@ const char* ListOf(v1::ContactKind kind) {
   return kind == v1::CONTACT_KIND_FORCE ? "forces" : "contacts";
 }
 
-/// Reads columns of contacts, with the duration of an elastic collision where none is stated.
-void ReadColumns(const v1::ContactColumns& columns, ContactIntake& intake) {
+/// Reads rows of columns, which are valid. Errors: those of KindOf.
+template <typename Rows>
+absl::Status TryReadRows(const v1::ContactColumns& columns, const Rows& rows,
+                         const HertzContact& hertz, ContactIntake& intake) {
   ContactBatches batches(intake);
-  absl::Status status = batches.Visit(columns.kind(), [&](auto& batch) -> absl::Status {
-    RETURN_IF_ERROR(Validate(columns));
-    ASSIGN_OR_RETURN(const HertzContact hertz, ToHertzContact(columns.hertz()));
-    const int count = columns.object_size();
-    for (int row = 0; row < count; ++row) {
-      auto& contact = batch.Next(count - row);
+  absl::Status status = batches.Visit(columns.kind(), [&](auto& batch) {
+    auto left_count = static_cast<int>(std::ranges::size(rows));
+    for (const int row : rows) {
+      auto& contact = batch.Next(left_count--);
       ReadRow(columns, row, contact);
       contact.contact.impulse.hertz = hertz;
-      contact.contact.place = PlaceIn(ListOf(columns.kind()), count, row);
+      contact.contact.place = PlaceIn(ListOf(columns.kind()), columns.object_size(), row);
     }
     return absl::OkStatus();
   });
   batches.Send();
+  return status;
+}
+
+absl::Status TryReadColumns(const v1::ContactColumns& columns, ContactIntake& intake) {
+  RETURN_IF_ERROR(KindOf(columns.kind()).status());
+  RETURN_IF_ERROR(Validate(columns));
+  ASSIGN_OR_RETURN(const HertzContact hertz, ToHertzContact(columns.hertz()));
+  return TryReadRows(columns, std::views::iota(0, columns.object_size()), hertz, intake);
+}
+
+/// Reads columns of contacts, with the duration of an elastic collision where none is stated.
+void ReadColumns(const v1::ContactColumns& columns, ContactIntake& intake) {
+  absl::Status status = TryReadColumns(columns, intake);
   if (!status.ok()) intake.Reject(std::max<uint64_t>(1, CountContacts(columns)), std::move(status));
 }
 
@@ -176,10 +191,10 @@ v1::Blow ToProto(const BlowRecord& blow) {
   return proto;
 }
 
-size_t CountRows(const v1::ContactStep& step) {
-  int rows = step.contacts_size() + step.poses().object_size();
-  for (const v1::ContactColumns& columns : step.contact_columns()) rows += columns.object_size();
-  return static_cast<size_t>(rows);
+void ReadRows(const v1::ContactColumns& columns, std::span<const int> rows,
+              const HertzContact& hertz, ContactIntake& intake) {
+  [[maybe_unused]] const absl::Status read = TryReadRows(columns, rows, hertz, intake);
+  assert(read.ok());
 }
 
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {

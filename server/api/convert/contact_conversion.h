@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
+#include <span>
 
 #include "absl/status/status.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact.pb.h"
+#include "server/excitation/contact.h"
 #include "server/scene/contact_intake.h"
 
 namespace carillon {
@@ -17,8 +18,10 @@ ContactReading ToContactReading(v1::Frame frame, v1::PulseShape pulse_shape);
 v1::ContactFindings ToProto(const IntakeFindings& findings);
 v1::Blow ToProto(const BlowRecord& blow);
 
-/// Returns the number of contacts and poses in a step.
-size_t CountRows(const v1::ContactStep& step);
+/// Gives `intake` these rows of columns, which must be valid and of a known kind. `hertz` has the
+/// known figures of the collisions.
+void ReadRows(const v1::ContactColumns& columns, std::span<const int> rows,
+              const HertzContact& hertz, ContactIntake& intake);
 
 /// Gives `intake` a whole step, in the order poses, contacts as rows, contacts as columns. Contacts
 /// that cannot be read count as rejected (CONTACT_MALFORMED, COLUMNS_MISMATCHED, UNKNOWN_STRIKER).

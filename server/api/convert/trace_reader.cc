@@ -16,7 +16,6 @@
 #include "server/api/convert/pose_conversion.h"
 #include "server/api/convert/resource_name.h"
 #include "server/scene/contact_stream.h"
-#include "server/scene/scene_registry.h"
 
 namespace carillon {
 namespace {
@@ -41,11 +40,12 @@ absl::Status TraceReader::Take(const v1::RenderRequest& request) {
   }
 }
 
-absl::StatusOr<std::unique_ptr<OfflineRenderer>> TraceReader::Finish() {
+absl::Status TraceReader::Finish() {
   if (!renderer_) {
     return Malformed("the trace is empty; send settings, a header, objects, then steps");
   }
-  return std::move(renderer_);
+  renderer_->forward().Finish();
+  return absl::OkStatus();
 }
 
 absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
@@ -119,12 +119,8 @@ absl::Status TraceReader::TakeClock(const v1::ContactTraceClock& clock) {
 
 absl::Status TraceReader::TakeObject(const v1::ContactTraceObject& message) {
   ASSIGN_OR_RETURN(ObjectOfModel object, ToObject(message, database_.models()));
-  if (++object_count_ > SceneRegistry::kMaxObjectCount) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
-                   absl::StrCat("the trace has over ", SceneRegistry::kMaxObjectCount,
-                                " objects, the most that sound together: render it in parts"));
-  }
-  return renderer_->AddObject(message.handle(), std::move(object.model), object.properties);
+  return renderer_->forward().AddObject(message.handle(), std::move(object.model),
+                                        object.properties);
 }
 
 absl::Status TraceReader::CheckTime(double time_s) const {
@@ -146,14 +142,6 @@ absl::Status TraceReader::CheckTime(double time_s) const {
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   RETURN_IF_ERROR(CheckTime(step.time_s()));
   time_s_ = step.time_s();
-  impulse_count_ += CountRows(step);
-  // A pose of the listener gives an event for each object.
-  if (step.has_listener()) impulse_count_ += object_count_;
-  if (impulse_count_ > kMaxImpulseCount) {
-    return Refusal(absl::StatusCode::kResourceExhausted, "TRACE_TOO_LARGE",
-                   absl::StrCat("the trace has over ", kMaxImpulseCount,
-                                " impulses and poses; render it in pieces"));
-  }
   return ReadStep(step, renderer_->intake());
 }
 

@@ -17,22 +17,20 @@ namespace carillon {
 /// Builds an offline renderer from the requests of one Render call.
 class TraceReader {
  public:
-  static constexpr uint64_t kMaxImpulseCount = 4'000'000;
-
   TraceReader(ModeDatabase& database, HeadStore& heads, BodyCache& bodies)
       : database_(database), heads_(heads), bodies_(bodies) {}
 
   /// Takes a request. Errors: InvalidArgument (TRACE_MALFORMED, and those of the objects'
-  /// materials), ResourceExhausted (TRACE_TOO_LARGE: too many objects or contacts), NotFound
-  /// (MODAL_MODEL_NOT_FOUND), and those of HeadStore and OfflineRenderer.
+  /// materials), NotFound (MODAL_MODEL_NOT_FOUND), and those of HeadStore, OfflineRenderer and
+  /// ForwardRenderer.
   absl::Status Take(const v1::RenderRequest& request);
 
-  /// Returns the renderer after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing
-  /// was sent).
-  absl::StatusOr<std::unique_ptr<OfflineRenderer>> Finish();
+  /// Ends the trace after the last request. Errors: InvalidArgument (TRACE_MALFORMED: nothing was
+  /// sent).
+  absl::Status Finish();
 
-  /// Returns the memory that the trace takes so far.
-  size_t held_bytes() const { return renderer_ ? renderer_->held_bytes() : 0; }
+  /// Returns the renderer, or null before the header was taken.
+  OfflineRenderer* renderer() { return renderer_.get(); }
 
   uint32_t sample_rate_hz() const { return settings_->sample_rate_hz; }
   uint32_t channel_count() const { return settings_->channel_count; }
@@ -53,8 +51,6 @@ class TraceReader {
   std::optional<OfflineSettings> settings_;
   std::unique_ptr<OfflineRenderer> renderer_;  // set once the header was read
   double time_s_ = 0;                          // the earliest time that the next step may have
-  uint64_t impulse_count_ = 0;                 // number of impulses and poses
-  uint64_t object_count_ = 0;
 };
 
 }  // namespace carillon

@@ -8,6 +8,7 @@
 #include "server/api/call/status_conversion.h"
 #include "server/api/call/unary_call.h"
 #include "server/api/services/listen_call.h"
+#include "server/api/services/perform_call.h"
 #include "server/api/services/render_call.h"
 #include "server/synthesis/bank/oscillator_bank.h"
 
@@ -32,13 +33,14 @@ absl::StatusOr<std::optional<BusId>> AudioService::HeardBus(
   return bus;
 }
 
-grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
-    grpc::CallbackServerContext* context) {
-  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kRendering},
-              [this, context](const Principal& caller, ClientPlace place) {
-                ClientLimits& limits = daemon_.reception.limits;
-                return MakeRenderCall(
-                    {.database = daemon_.database,
+template <typename Make>
+auto AudioService::OpenRendering(grpc::CallbackServerContext* context, Make make,
+                                 const char* function) {
+  return Open(
+      *context, daemon_.reception, {Role::kStrike, Holding::kRendering},
+      [this, context, make](const Principal& caller, ClientPlace place) {
+        ClientLimits& limits = daemon_.reception.limits;
+        return make({.database = daemon_.database,
                      .heads = daemon_.heads,
                      .bodies = render_bodies_,
                      .pool = daemon_.reception.pool,
@@ -47,7 +49,18 @@ grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::Ren
                     *context,
                     {.call = std::move(place),
                      .memory = ClientPlace(limits, Holding::kRenderingMib, caller.client)});
-              });
+      },
+      function);
+}
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* AudioService::RenderRaw(
+    grpc::CallbackServerContext* context) {
+  return OpenRendering(context, MakeRenderCall, __func__);
+}
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::PerformResponse>* AudioService::PerformRaw(
+    grpc::CallbackServerContext* context) {
+  return OpenRendering(context, MakePerformCall, __func__);
 }
 
 grpc::ServerUnaryReactor* AudioService::GetMixer(grpc::CallbackServerContext* context,

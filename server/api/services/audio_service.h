@@ -38,6 +38,7 @@ class AudioService final : public RawService<v1::AudioService> {
  public:
   explicit AudioService(AudioContext daemon) : daemon_(std::move(daemon)) {
     ReadRaw("Render", &AudioService::RenderRaw);
+    ReadRaw("Perform", &AudioService::PerformRaw);
   }
 
   grpc::ServerWriteReactor<v1::ListenResponse>* Listen(grpc::CallbackServerContext* context,
@@ -52,6 +53,11 @@ class AudioService final : public RawService<v1::AudioService> {
  private:
   grpc::ServerBidiReactor<grpc::ByteBuffer, v1::RenderResponse>* RenderRaw(
       grpc::CallbackServerContext* context);
+  grpc::ServerBidiReactor<grpc::ByteBuffer, v1::PerformResponse>* PerformRaw(
+      grpc::CallbackServerContext* context);
+  /// Returns the call that `make` makes, with its places among those of its client.
+  template <typename Make>
+  auto OpenRendering(grpc::CallbackServerContext* context, Make make, const char* function);
   /// Returns the bus of a scene, or nothing for the output if the name is empty. Errors: those of
   /// SceneOwners::Parse.
   absl::StatusOr<std::optional<BusId>> HeardBus(const grpc::CallbackServerContext& context,

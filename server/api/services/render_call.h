@@ -27,7 +27,7 @@ struct RenderContext {
 /// The places that a rendering holds.
 struct RenderPlaces {
   ClientPlace call;
-  ClientPlace memory;  ///< of the kind kRenderingMib; grows with the trace
+  ClientPlace memory;  ///< of the kind kRenderingMib; grows with the objects
 };
 
 /// Makes a call of AudioService.Render, which holds `places` and deletes itself when it is done.

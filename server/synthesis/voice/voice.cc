@@ -93,6 +93,13 @@ Voice::Heard Voice::Hear(double delay_frames) const noexcept {
   const double reference = hearing.reference_distance_m;
   const double gain = hearing.distance_gain ? reference / std::max(distance, reference) : 1;
   heard.gains.fill(static_cast<float>(gain));
+  if (hearing.ambisonic) {
+    Vector3 direction = Rotated(path.away_m, Inverse(listener.orientation));
+    for (double& coordinate : direction) coordinate = distance > 0 ? coordinate / distance : 0;
+    heard.gains = AmbisonicGains(direction);
+    for (float& channel : heard.gains) channel *= static_cast<float>(gain);
+    return heard;
+  }
   if (hearing.panning && settings_.channel_count == 2 && !binaural()) {
     const double unit = std::max(Length(listener.right), 0.5);
     const double side = std::clamp(
@@ -112,6 +119,7 @@ void Voice::HearBinaurally(const Vector3& away_m, const Place& listener,
 }
 
 void Voice::NoteHeard() noexcept {
+  if (!delayed() && !binaural() && !jump_waits_ && rested()) return;
   object_.Advance();
   listener_.Advance();
   positions_.Add(SoundAt(object_.place()));
@@ -168,7 +176,7 @@ void Voice::Render(std::span<float> frames) noexcept {
   }
   quiet_frame_count_ = fed_ ? 0 : quiet_frame_count_ + input_.size();
   rest_block_count_ = object_.at_rest() && listener_.at_rest() ? rest_block_count_ + 1 : 0;
-  asleep_ = silent() && rest_block_count_ > positions_.size() + heard_.size();
+  asleep_ = silent() && rested();
   if (fed_) std::ranges::fill(input_, 0.0F);
   fed_ = false;
 }
@@ -211,6 +219,24 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
   return line_ ? line_->Read(delay_frames + static_cast<double>(input_.size() - n)) : input_[n];
 }
 
+/// Renders without delay and cross-fade, in loops that compilers vectorise.
+void Voice::RenderHere(const Hearings& heard, std::span<float> frames) const noexcept {
+  const size_t channels = settings_.channel_count;
+  const double step = 1 / static_cast<double>(input_.size());
+  for (size_t channel = 0; channel < channels; ++channel) {
+    const float from = heard[1].gains[channel], to = heard[2].gains[channel];
+    float* const out = frames.data() + channel;
+    if (from == to) {
+      for (size_t n = 0; n < input_.size(); ++n) out[n * channels] += input_[n] * from;
+      continue;
+    }
+    for (size_t n = 0; n < input_.size(); ++n) {
+      const auto u = static_cast<float>(static_cast<double>(n) * step);
+      out[n * channels] += input_[n] * (from + u * (to - from));
+    }
+  }
+}
+
 void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                        std::span<float> frames) noexcept {
   if (binaural()) {
@@ -218,6 +244,7 @@ void Voice::RenderFrom(const Hearings& heard, float fade, float fade_step,
                       frames);
   }
   const size_t channels = settings_.channel_count;
+  if (!line_ && fade == 1 && fade_step == 0) return RenderHere(heard, frames);
   const DelayCurve delay(
       {heard[0].delay_frames, heard[1].delay_frames, heard[2].delay_frames, heard[3].delay_frames});
   const double step = 1 / static_cast<double>(input_.size());

@@ -12,6 +12,7 @@
 #include "server/base/pose.h"
 #include "server/synthesis/schedule/bearing.h"
 #include "server/synthesis/schedule/mixer_event.h"
+#include "server/synthesis/voice/ambisonics.h"
 #include "server/synthesis/voice/delay_line.h"
 #include "server/synthesis/voice/doppler.h"
 #include "server/synthesis/voice/ears.h"
@@ -26,6 +27,7 @@ struct HearingSettings {
   bool propagation_delay = false;
   bool panning = false;
   bool binaural = false;     ///< by the responses of a measured head, in place of panning
+  bool ambisonic = false;    ///< in (order + 1)^2 channels, in place of panning
   bool directivity = false;  ///< modes sound as loud as they radiate towards the listener
   bool near_field = false;   ///< directivity includes the near field
   double reference_distance_m = 1;
@@ -33,7 +35,7 @@ struct HearingSettings {
 
   bool operator==(const HearingSettings&) const = default;
   bool any() const {
-    return distance_gain || propagation_delay || panning || binaural || directivity;
+    return distance_gain || propagation_delay || panning || binaural || ambisonic || directivity;
   }
 };
 
@@ -52,6 +54,8 @@ inline constexpr double kLongestPropagationS = 0.6;
 /// more than 0.9 or shrinks by more than 3 frames in a frame, is rendered as a cross-fade of 10 ms.
 /// Frequencies that are shifted above Nyquist alias. The delay is at least DelayLine::kLeastDelay
 /// samples, the delay of an object at 0.09 m (at 48 kHz).
+///
+/// In ambisonics, the gains are those of AmbisonicGains for the direction of the sound.
 ///
 /// For two ears, the responses of a measured head for the direction of the sound replace the gains
 /// to left and right. The delays of these responses add to d, so that each ear has its own Doppler
@@ -125,7 +129,7 @@ class Voice {
   /// ear_delay_frames of that ear.
   struct Heard {
     double delay_frames = 0;
-    std::array<float, 2> gains{};
+    std::array<float, kMostChannels> gains{};
     std::array<double, 2> ear_delay_frames{};
     Vector3 direction{0, 0, -1};
   };
@@ -141,9 +145,12 @@ class Voice {
   void NoteEars(bool jumps) noexcept;
   void RenderFrom(const Hearings& heard, float fade, float fade_step,
                   std::span<float> frames) noexcept;
+  void RenderHere(const Hearings& heard, std::span<float> frames) const noexcept;
   void RenderEars(const Hearings& heard, Ears& ears, float fade, float fade_step,
                   std::span<float> frames) noexcept;
   float Sample(double delay_frames, size_t n) const noexcept;
+  /// Whether nothing has moved for so long that nothing will change until the next motion.
+  bool rested() const noexcept { return rest_block_count_ > positions_.size() + heard_.size(); }
   /// Whether all of the object's sound has arrived.
   bool silent() const noexcept {
     const size_t ears = binaural() ? settings_.head->tap_count() : 0;

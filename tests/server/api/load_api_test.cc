@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <string>
+#include <thread>
 
 #include "tests/server/api/served_daemon.h"
 
@@ -67,7 +69,7 @@ TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
   }
   v1::RenderResponse response;
   EXPECT_FALSE(stream->Read(&response));
-  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TRACE_TOO_LARGE");
+  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_OBJECTS");
 }
 
 /// A daemon of whose memory for renderings one client has very little.
@@ -76,30 +78,65 @@ class LittleMemoryApi : public LoadApi {
   LittleMemoryApi() : LoadApi({.client_share = 0.001}) {}
 };
 
-TEST_F(LittleMemoryApi, ATraceThatTakesMoreThanTheClientsShareIsRefused) {
+TEST_F(LittleMemoryApi, ATraceWhoseObjectsTakeMoreThanTheClientsShareIsRefused) {
   grpc::ClientContext context;
   const auto stream = BeginTrace(context);
   v1::RenderRequest request;
   v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
-  object.set_handle(1);
   object.set_modal_model(ImportSmallModel());
   *object.mutable_material() = SmallMaterial();
-  stream->Write(request);
-  for (int step = 0; step < 100; ++step) {
-    v1::ContactStep& message = *request.mutable_record()->mutable_step();
-    message.set_time_s(step);
-    message.clear_contacts();
-    for (int i = 0; i < 1000; ++i) {
-      *message.add_contacts() = Strike(1);
-      message.mutable_contacts(i)->set_time_offset_s(1e-3 * i);  // equal ones would be added up
-    }
+  for (uint32_t handle = 1; handle <= 100; ++handle) {
+    object.set_handle(handle);
     if (!stream->Write(request)) break;
   }
   v1::RenderResponse response;
   EXPECT_FALSE(stream->Read(&response));
-  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TRACE_TOO_LARGE");
+  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
   while (server().clients().renderings > 0) {
   }
+}
+
+/// The events of this trace would take 200 MiB. A thread sends them, because the daemon reads on
+/// only when the sound so far has been read.
+TEST_F(LittleMemoryApi, ATraceOfAnyLengthIsRendered) {
+  constexpr int kStepCount = 3000, kImpulseCount = 1000;
+  grpc::ClientContext context;
+  const auto stream = BeginTrace(context);
+  const std::string model = ImportSmallModel();
+  std::jthread sender([&] {
+    v1::RenderRequest request;
+    v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
+    object.set_handle(1);
+    object.set_modal_model(model);
+    *object.mutable_material() = SmallMaterial();
+    stream->Write(request);
+    v1::ContactStep& step = *request.mutable_record()->mutable_step();
+    v1::ContactColumns& columns = *step.add_contact_columns();
+    columns.set_kind(v1::CONTACT_KIND_IMPACT);
+    for (int i = 0; i < kImpulseCount; ++i) {
+      columns.add_object(1);
+      for (const float x : {0.0F, 0.0F, 0.0F}) columns.add_point_m(x);
+      for (const float x : {1e-6F, 0.0F, 0.0F}) columns.add_impulse_newton_seconds(x);
+      columns.add_duration_s(0);
+      columns.add_time_offset_s(1e-5F * static_cast<float>(i));  // equal ones would be added up
+    }
+    for (int i = 0; i < kStepCount; ++i) {
+      step.set_time_s(0.01 * i);
+      stream->Write(request);
+    }
+    stream->WritesDone();
+  });
+  v1::RenderResponse response;
+  uint64_t frame_count = 0;
+  while (stream->Read(&response)) {
+    if (!response.has_block()) continue;
+    EXPECT_EQ(response.block().first_frame(), frame_count);
+    frame_count += response.block().samples().size() / sizeof(float);
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(response.summary().accepted_count(), uint64_t{kStepCount} * kImpulseCount);
+  EXPECT_EQ(response.summary().rejected_count(), 0U);
+  EXPECT_EQ(response.summary().frame_count(), frame_count);
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ TEST(ContactIntake, LiveAndOfflineGiveTheSameVerdictsForTheSameReasons) {
   const auto renderer = *OfflineRenderer::Make({.tail_s = 0.1, .step_s = kStepS}, bodies);
   for (const uint32_t handle : {1U, 2U}) {
     ASSERT_TRUE(scenes.AddObject(scene, handle, SmallModel(), SmallProperties()).ok());
-    ASSERT_TRUE(renderer->AddObject(handle, SmallModel(), SmallProperties()).ok());
+    ASSERT_TRUE(renderer->forward().AddObject(handle, SmallModel(), SmallProperties()).ok());
   }
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = kStepS});
   const Verdicts live = Send(stream->intake());
@@ -159,6 +159,7 @@ TEST(ContactIntake, LiveAndOfflineGiveTheSameVerdictsForTheSameReasons) {
   }
   std::vector<float> sound(size_t{48000} * 2);
   stream->intake().Finish();
+  renderer->forward().Finish();
   renderer->Render(sound);
   mixer.Render(std::span(sound).first(OfflineRenderer::kBlockFrameCount * 700));
   EXPECT_EQ(renderer->summary().rejected_count, stream->counts().rejected_count);

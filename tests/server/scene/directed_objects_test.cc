@@ -159,9 +159,10 @@ TEST_F(DirectedObjects, SoundOfflineBitForBitAsLiveAndForAnyNumberOfThreads) {
                                 .mapping = {.first_frame = *stream->first_frame(), .delay_s = 0.03},
                                 .thread_count = thread_count},
                                bodies, &database_->transfers());
-    ASSERT_TRUE(renderer->AddObject(1, Model(), SmallProperties()).ok());
+    ASSERT_TRUE(renderer->forward().AddObject(1, Model(), SmallProperties()).ok());
     Simulate(renderer->intake());
     std::vector<float> offline(live.size());
+    renderer->forward().Finish();
     ASSERT_EQ(renderer->Render(offline), offline.size());
     EXPECT_EQ(offline, live);
   }

@@ -44,14 +44,15 @@ class OfflineRendererTest : public testing::Test {
         {.sample_rate_hz = kRate, .tail_s = tail_s, .mapping = mapping}, bodies_);
     ObjectProperties larger = SmallProperties();
     larger.material.size = 1.7;
-    EXPECT_TRUE(renderer->AddObject(1, model_, SmallProperties()).ok());
-    EXPECT_TRUE(renderer->AddObject(2, model_, larger).ok());
+    EXPECT_TRUE(renderer->forward().AddObject(1, model_, SmallProperties()).ok());
+    EXPECT_TRUE(renderer->forward().AddObject(2, model_, larger).ok());
     return renderer;
   }
 
   static std::vector<float> RenderAll(OfflineRenderer& renderer, size_t blocks_at_a_time) {
     std::vector<float> sound;
     std::vector<float> frames(blocks_at_a_time * OfflineRenderer::kBlockFrameCount);
+    renderer.forward().Finish();
     while (const size_t count = renderer.Render(frames)) {
       sound.insert(sound.end(), frames.begin(), frames.begin() + static_cast<ptrdiff_t>(count));
     }
@@ -139,7 +140,7 @@ std::vector<float> RenderPlaced(const SceneSpace& space, size_t thread_count,
                                                 .thread_count = thread_count},
                                                bodies);
   for (const uint32_t handle : {1U, 2U}) {
-    EXPECT_TRUE(renderer->AddObject(handle, SmallModel(), SmallProperties()).ok());
+    EXPECT_TRUE(renderer->forward().AddObject(handle, SmallModel(), SmallProperties()).ok());
   }
   double last_s = -1;
   StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
@@ -150,6 +151,7 @@ std::vector<float> RenderPlaced(const SceneSpace& space, size_t thread_count,
     renderer->intake().EndStep();
   });
   std::vector<float> sound(size_t{2} * 48000 * 3);
+  renderer->forward().Finish();
   sound.resize(2 * renderer->Render(sound));
   EXPECT_EQ(renderer->summary().rejected_count, 0U);
   return sound;
@@ -189,6 +191,73 @@ TEST_P(PlacesTest, AreHeardBitForBitAsLiveAndForAnyNumberOfThreads) {
   EXPECT_GT(*std::ranges::max_element(offline), 0.0003);
   EXPECT_EQ(offline, live);
   EXPECT_EQ(RenderPlaced(space, 2, mapping, bodies_), offline);
+}
+
+/// The sound of steps that are given while others are rendered is that of all steps given first.
+TEST_F(OfflineRendererTest, IsTheSameWhileItsStepsComeIn) {
+  const auto whole = Make();
+  const auto forward = Make();
+  std::vector<float> sound, frames(16 * OfflineRenderer::kBlockFrameCount);
+  size_t before_the_end = 0;
+  const auto read = [&] {
+    while (const size_t count = forward->Render(frames)) {
+      sound.insert(sound.end(), frames.begin(), frames.begin() + static_cast<ptrdiff_t>(count));
+    }
+  };
+  // The sound of the first contacts has long ended before the next come.
+  for (const double begin_s : {0.0, 3.0, 3.4}) {
+    StrikeAll([&](double time_s, const ObjectImpulse& impulse) {
+      StrikeAt(*whole, begin_s + time_s, impulse);
+      StrikeAt(*forward, begin_s + time_s, impulse);
+      read();
+    });
+    before_the_end = sound.size();
+  }
+  EXPECT_GT(before_the_end, 3.3 * kRate);
+  forward->forward().Finish();
+  read();
+  EXPECT_EQ(sound, RenderAll(*whole, 8));
+  EXPECT_EQ(forward->summary().accepted_count, whole->summary().accepted_count);
+}
+
+TEST_F(OfflineRendererTest, KeepsTheSoundBackThatMayLieAfterItsEnd) {
+  const auto renderer = Make(0.1);
+  StrikeAt(*renderer, 0, SmallImpulse(1));
+  ASSERT_TRUE(renderer->intake().BeginStep(2).ok());
+  std::vector<float> sound(size_t{3} * kRate);
+  EXPECT_EQ(renderer->Render(sound), 0.1 * kRate);
+  StrikeAt(*renderer, 2, SmallImpulse(1));
+  renderer->forward().Finish();
+  EXPECT_EQ(renderer->Render(sound), 2 * kRate);
+}
+
+/// Steps of poses alone go on for ten minutes after a contact, and another contact follows.
+TEST_F(OfflineRendererTest, TakesNoMemoryForALongSilence) {
+  constexpr double kSilenceS = 600;
+  auto renderer =
+      *OfflineRenderer::Make({.sample_rate_hz = 8000,
+                              .step_s = 0.5,
+                              .space = {.hearing = {.distance_gain = true}, .listener = {}},
+                              .thread_count = 1},
+                             bodies_);
+  ASSERT_TRUE(renderer->forward().AddObject(1, model_, SmallProperties()).ok());
+  std::vector<float> frames(64 * OfflineRenderer::kBlockFrameCount);
+  StrikeAt(*renderer, 0, SmallImpulse(1));
+  size_t frame_count = 0, most_bytes = 0;
+  for (double time_s = 0.5; time_s < kSilenceS; time_s += 0.5) {
+    ASSERT_TRUE(renderer->intake().BeginStep(time_s).ok());
+    renderer->intake().Move(1, {.position_m = {std::sin(time_s), 1, 0}});
+    renderer->intake().EndStep();
+    while (const size_t count = renderer->Render(frames)) frame_count += count;
+    most_bytes = std::max(most_bytes, renderer->held_bytes() + renderer->forward().waiting_bytes());
+  }
+  EXPECT_LT(frame_count, 8000U * 10);  // until the first contact is silent
+  EXPECT_LT(most_bytes, size_t{1} << 20U);
+  StrikeAt(*renderer, kSilenceS, SmallImpulse(1));
+  renderer->forward().Finish();
+  while (const size_t count = renderer->Render(frames)) frame_count += count;
+  EXPECT_GT(frame_count, 8000U * kSilenceS);
+  EXPECT_EQ(renderer->summary().accepted_count, 2U);
 }
 
 TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
@@ -249,15 +318,16 @@ TEST_F(OfflineRendererTest, TellsBlowsFromItsFirstFrameAndOnTheSurface) {
       bodies_);
   ObjectProperties twice = SmallProperties();
   twice.material.size = 2;
-  ASSERT_TRUE(renderer->AddObject(7, model_, twice).ok());
+  ASSERT_TRUE(renderer->forward().AddObject(7, model_, twice).ok());
   ObjectImpulse impulse = SmallImpulse(7, 0.5);
   impulse.contact.impulse.location = SurfacePoint{.triangle = 0, .weights = {0, 0.5, 0.5}};
   StrikeAt(*renderer, 3.5, impulse);
   impulse.contact.handle = 8;  // is rejected
   StrikeAt(*renderer, 3.6, impulse);
   RenderAll(*renderer, 8);
-  ASSERT_EQ(renderer->blows().size(), 1U);
-  const BlowRecord& blow = renderer->blows().front();
+  const std::vector<BlowRecord> blows = renderer->forward().TakeBlows();
+  ASSERT_EQ(blows.size(), 1U);
+  const BlowRecord& blow = blows.front();
   EXPECT_NEAR(blow.time_s, 0.625, 1e-9);
   EXPECT_EQ(blow.handle, 7U);
   EXPECT_FALSE(blow.by.has_value());
@@ -270,7 +340,7 @@ TEST_F(OfflineRendererTest, TellsNoBlowsUnlessAsked) {
   const auto renderer = Make();
   StrikeAt(*renderer, 0, SmallImpulse(1));
   RenderAll(*renderer, 8);
-  EXPECT_TRUE(renderer->blows().empty());
+  EXPECT_TRUE(renderer->forward().TakeBlows().empty());
 }
 
 TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
@@ -282,7 +352,7 @@ TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
 }
 
 TEST_F(OfflineRendererTest, RefusesTwoObjectsOfOneHandle) {
-  EXPECT_THAT(Make()->AddObject(1, model_, SmallProperties()).ToString(),
+  EXPECT_THAT(Make()->forward().AddObject(1, model_, SmallProperties()).ToString(),
               HasSubstr("OBJECT_EXISTS: "));
 }
 
@@ -291,7 +361,7 @@ TEST_F(OfflineRendererTest, AnImpactInOneStepSoundsAsLoudAsOneThatAnEngineSpread
   for (const int step_count : {1, 2, 5, 8}) {
     const auto renderer = *OfflineRenderer::Make(
         {.sample_rate_hz = kRate, .tail_s = 0.5, .step_s = 1.0 / 60}, bodies_);
-    ASSERT_TRUE(renderer->AddObject(1, model_, SmallProperties()).ok());
+    ASSERT_TRUE(renderer->forward().AddObject(1, model_, SmallProperties()).ok());
     for (int step = 0; step < 20; ++step) {
       ASSERT_TRUE(renderer->intake().BeginStep(step / 60.0).ok());
       if (step >= 1 && step <= step_count) {

@@ -176,16 +176,17 @@ TEST(TransferTakeOver, ABlowIsToldWhenItSounds) {
   const auto render = [&](double time_s) {
     auto renderer = *OfflineRenderer::Make({.tail_s = 0.1, .tells_blows = true}, bodies,
                                            &stage.database->transfers());
-    EXPECT_TRUE(renderer->AddObject(1, model, SmallProperties()).ok());
+    EXPECT_TRUE(renderer->forward().AddObject(1, model, SmallProperties()).ok());
     ObjectImpulse impulse = SmallImpulse(1);
     impulse.contact.impulse.duration_s = 0.004;
     EXPECT_TRUE(renderer->intake().BeginStep(time_s).ok());
     renderer->intake().Strike(impulse);
     renderer->intake().EndStep();
     std::vector<float> sound(10 * kBlock);
+    renderer->forward().Finish();
     renderer->Render(sound);
     EXPECT_EQ(renderer->summary().paper_coupling_object_count, 0U);
-    return std::pair(sound, renderer->blows().at(0).time_s);
+    return std::pair(sound, renderer->forward().TakeBlows().at(0).time_s);
   };
   const auto [sound, time_s] = render(0.002);
   EXPECT_NEAR(time_s, 0.002, 1e-9);
@@ -205,9 +206,9 @@ TEST(TransferTakeOver, ARenderingCountsTheObjectsThatLackATransfer) {
   const auto model = *stage.database->models().Find(SmallModel()->digest);
   auto renderer = *OfflineRenderer::Make({.tail_s = 0.1}, bodies, &stage.database->transfers());
   ObjectProperties properties = SmallProperties();
-  EXPECT_TRUE(renderer->AddObject(1, model, properties).ok());
+  EXPECT_TRUE(renderer->forward().AddObject(1, model, properties).ok());
   properties.radiation = RadiationModel::kPaperCoupling;
-  EXPECT_TRUE(renderer->AddObject(2, model, properties).ok());
+  EXPECT_TRUE(renderer->forward().AddObject(2, model, properties).ok());
   EXPECT_EQ(renderer->summary().paper_coupling_object_count, 1U);
 }
 

@@ -22,13 +22,14 @@ from carillon.jobs import Job
 from carillon.materials import material
 from carillon.meshes import MeshFile
 from carillon.models import Model
+from carillon.performing import Ambisonics, Ears, HearingEnvironment, Omni, Performance, Stereo
 from carillon.scenes import Scene, SoundingObject
 from carillon.sound import Sound
 from carillon.streams import ContactStream
 from carillon.traces import Trace
 from carillon.version import __version__
 
-__all__ = ["CarillonError", "Client", "ContactForces", "ContactStream", "ContactWarning", "Contacts", "Impacts", "Job",
-           "LabelWarning", "MeshFile", "Model", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject",
-           "Trace", "TransferWarning", "UnitWarning", "__version__", "aio", "connect", "default_server", "material",
-           "striker"]
+__all__ = ["Ambisonics", "CarillonError", "Client", "ContactForces", "ContactStream", "ContactWarning", "Contacts",
+           "Ears", "HearingEnvironment", "Impacts", "Job", "LabelWarning", "MeshFile", "Model", "Omni", "Performance",
+           "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Stereo", "Trace", "TransferWarning",
+           "UnitWarning", "__version__", "aio", "connect", "default_server", "material", "striker"]

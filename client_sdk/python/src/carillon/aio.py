@@ -26,6 +26,7 @@ from carillon.errors import CarillonError
 from carillon.faces import AwaitedBlock
 from carillon.jobs import AsyncJob
 from carillon.models import AsyncModel
+from carillon.performing import AsyncPerformance
 from carillon.recordings import AsyncRecording, AsyncTraceRecording
 from carillon.scenes import AsyncObject, AsyncScene
 from carillon.sound import Sound
@@ -43,12 +44,13 @@ def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] |
     return AsyncClient(server, tls_roots=tls_roots, **credentials)
 
 
-class AsyncClient(AwaitedBlock, ClientCalls[AsyncModel, AsyncJob, AsyncScene, AsyncRecording]):
+class AsyncClient(AwaitedBlock, ClientCalls[AsyncModel, AsyncJob, AsyncScene, AsyncRecording, AsyncPerformance]):
     """A connection, as a context manager closed at the end. The attributes *_stub are the services of the contract,
     for calls that have no method here. Renderings wait for each other where the daemon would refuse so many of one
     client."""
 
     _model_kind, _job_kind, _scene_kind, _recording_kind = AsyncModel, AsyncJob, AsyncScene, AsyncRecording
+    _performance_kind = AsyncPerformance
     _places: Optional[asyncio.Semaphore] = None  # of renderings
 
     async def wait(self, job: AsyncJob, progress_bar: Any = None) -> AsyncModel:
@@ -79,5 +81,5 @@ class AsyncClient(AwaitedBlock, ClientCalls[AsyncModel, AsyncJob, AsyncScene, As
             return await render()
 
 
-__all__ = ["AsyncClient", "AsyncContactStream", "AsyncJob", "AsyncModel", "AsyncObject", "AsyncRecording", "AsyncScene",
-           "AsyncTraceRecording", "connect"]
+__all__ = ["AsyncClient", "AsyncContactStream", "AsyncJob", "AsyncModel", "AsyncObject", "AsyncPerformance",
+           "AsyncRecording", "AsyncScene", "AsyncTraceRecording", "connect"]

@@ -10,11 +10,12 @@ from typing import Any, Generic, Optional
 from carillon import checks, job_calls, meshes, models, progress, rendering
 from carillon import materials as material_calls
 from carillon.connection import CREDENTIALS, Connection
-from carillon.contacts import PoseLike, to_pose
+from carillon.contacts import Frame, PoseLike, PulseShape, to_pose
 from carillon.faces import BlockingBlock, call, finished, items
 from carillon.jobs import AnyJob, Job, JobCalls
 from carillon.materials import Material
 from carillon.models import AnyModel, Model
+from carillon.performing import AnyPerformance, Microphone, Performance, settings_of
 from carillon.recordings import AnyRecording, Recording, heard
 from carillon.scenes import AnyScene, Scene
 from carillon.settings import Settings, Unit, to_settings
@@ -37,7 +38,7 @@ def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] |
     return Client(server, tls_roots=tls_roots, **credentials)
 
 
-class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording]):
+class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording, AnyPerformance]):
     """A connection, as a context manager closed at the end. The attributes *_stub are the services of the contract,
     for calls that have no method here."""
 
@@ -45,6 +46,7 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording])
     _job_kind: type[AnyJob]
     _scene_kind: type[AnyScene]
     _recording_kind: type[AnyRecording]
+    _performance_kind: type[AnyPerformance]
 
     @call
     async def info(self) -> server_service_pb2.GetServerInfoResponse:
@@ -172,6 +174,16 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording])
         """Records what the daemon plays."""
         return await heard(self._recording_kind(self, {}), seconds)
 
+    def perform(self, *, step: float, environments: int = 1, microphones: Iterable[Microphone] = (),
+                latency: float = 0, frame: Optional[Frame] = None, pulse_shape: Optional[PulseShape] = None,
+                **settings: Any) -> AnyPerformance:
+        """Performs environments that are simulated in step, each heard by the `microphones`: within the block each
+        `step` of this many seconds gives its samples before the next. `latency` is the time from a contact to its
+        sound, 0 to 0.1 seconds. `settings` are fields of PerformSettings: sample_rate_hz, full_scale_pa, hearing and
+        tell_impacts."""
+        return self._performance_kind(self, settings_of(step, environments, microphones, latency, frame, pulse_shape,
+                                                        settings))
+
     def recording(self, **request: Any) -> AnyRecording:
         """Records what the daemon plays within the block, from its first line on. `request` has fields of
         ListenRequest: scene, block_frame_count and encoding."""
@@ -186,9 +198,10 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording])
         return f"<{type(self).__name__} of {self.server}>"
 
 
-class Client(BlockingBlock, ClientCalls[Model, Job, Scene, Recording]):
+class Client(BlockingBlock, ClientCalls[Model, Job, Scene, Recording, Performance]):
     __doc__ = ClientCalls.__doc__
     _model_kind, _job_kind, _scene_kind, _recording_kind = Model, Job, Scene, Recording
+    _performance_kind = Performance
 
     @property
     def materials(self) -> dict[str, material_pb2.Material]:

@@ -66,6 +66,7 @@ class _Impulses:
     second_points: Optional[Array] = None
     second_rotations: Optional[Array] = None
     striker: Striker = None
+    environments: Any = None
 
 
 @dataclasses.dataclass
@@ -78,7 +79,7 @@ class Impacts(_Impulses):
     seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
     `time_offsets` are seconds from the step's time to the impact. `second_objects` has the objects that struck, zero
     for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
-    """
+    `environments` are those of a performance, by their index."""
 
 
 @dataclasses.dataclass
@@ -108,6 +109,7 @@ class ContactForces:
     travel_speeds: Optional[Array] = None
     roughness_depth: float = 0
     irregularity_length: float = 0
+    environments: Any = None
 
 
 @dataclasses.dataclass
@@ -117,6 +119,7 @@ class Poses:
     objects: Any
     positions: Array
     orientations: Optional[Array] = None
+    environments: Any = None
 
 
 def striker(name: str = "", **figures: float) -> contact_pb2.HertzContact:
@@ -237,10 +240,21 @@ def _pairs(points: Array, vectors: Array, name: str) -> tuple[numpy.ndarray, num
 
 def add_contacts(step: contact_pb2.ContactStep, given: Union[_Impulses, ContactForces]) -> int:
     """Adds contacts of one kind to a step and returns their number."""
+    _refuse_environments(given)
+    return fill_columns(step.contact_columns.add(), given)
+
+
+def _refuse_environments(given: Any) -> None:
+    if given.environments is not None:
+        raise ValueError("environments are those of a performance (Client.perform); a stream or a trace has none")
+
+
+def fill_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, ContactForces]) -> int:
+    """Fills in the columns of contacts of one kind and returns their number."""
     is_force = isinstance(given, ContactForces)
     points, vectors = _pairs(given.points, given.forces if isinstance(given, ContactForces) else given.impulses,
                              "forces" if is_force else "impulses")
-    columns, count = step.contact_columns.add(kind=_kind_of(given)), len(points)
+    columns.kind, count = _kind_of(given), len(points)
     append(columns, object=handles_of(given.objects, count), point_m=points,
            **{"force_newtons" if is_force else "impulse_newton_seconds": vectors})
     for name, field in NUMBERS.items():
@@ -299,10 +313,17 @@ def strike_of(item: Any, point: Array, impulse: Array, duration: Optional[float]
 
 
 def add_poses(step: contact_pb2.ContactStep, given: Poses) -> None:
+    _refuse_environments(given)
+    fill_pose_columns(step.poses, given)
+
+
+def fill_pose_columns(columns: contact_pb2.PoseColumns, given: Poses) -> int:
+    """Fills in the columns of poses and returns their number."""
     positions = _rows(given.positions, "positions")
-    append(step.poses, object=handles_of(given.objects, len(positions)), position_m=positions)
+    append(columns, object=handles_of(given.objects, len(positions)), position_m=positions)
     if given.orientations is not None:
-        append(step.poses, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
+        append(columns, orientation=_rows(given.orientations, "orientations", 4, len(positions)))
+    return len(positions)
 
 
 def scenes_of_objects(columns: Any) -> Iterator[tuple[str, str]]:

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/convert/perform_rows.h"
+
+#include <algorithm>
+#include <compare>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/convert/contact_conversion.h"
+#include "server/api/convert/contact_fields.h"
+#include "server/api/convert/hertz_contact_conversion.h"
+
+namespace carillon {
+namespace {
+
+absl::Status Invalid(absl::string_view reason, absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
+}
+
+/// Orders the contacts of a list by their content.
+class ByContent {
+ public:
+  explicit ByContent(const v1::ContactColumns& columns) : columns_(columns) {}
+
+  bool operator()(int a, int b) const {
+    for (const auto* column :
+         {&columns_.object(), &columns_.partner(), &columns_.second_object()}) {
+      if (const auto order = Compare(*column, 1, a, b); order != 0) return order < 0;
+    }
+    const auto& vectors = columns_.force_newtons_size() > 0 ? columns_.force_newtons()
+                                                            : columns_.impulse_newton_seconds();
+    if (const auto order = Compare(columns_.time_offset_s(), 1, a, b); order != 0) return order < 0;
+    if (const auto order = Compare(columns_.duration_s(), 1, a, b); order != 0) return order < 0;
+    if (const auto order = Compare(columns_.point_m(), 3, a, b); order != 0) return order < 0;
+    return Compare(vectors, 3, a, b) < 0;
+  }
+
+ private:
+  template <typename Column>
+  static std::partial_ordering Compare(const Column& column, int width, int a, int b) {
+    if (column.empty()) return std::partial_ordering::equivalent;
+    const auto* const data = column.data();
+    return std::lexicographical_compare_three_way(
+        data + a * width, data + (a + 1) * width, data + b * width, data + (b + 1) * width,
+        [](auto x, auto y) -> std::partial_ordering { return x <=> y; });
+  }
+
+  const v1::ContactColumns& columns_;
+};
+
+std::span<const uint32_t> SpanOf(const google::protobuf::RepeatedField<uint32_t>& column) {
+  return {column.data(), static_cast<size_t>(column.size())};
+}
+
+absl::Status Validate(const v1::MicrophonePoses& poses, size_t microphone_count) {
+  const int count = poses.microphone_size();
+  const bool rotated = poses.orientation_size() > 0;
+  if (poses.position_m_size() != 3 * count || (rotated && poses.orientation_size() != 4 * count)) {
+    return Invalid(
+        "COLUMNS_MISMATCHED",
+        absl::StrCat("microphone_poses has ", count, " microphones, ", poses.position_m_size(),
+                     " coordinates and ", poses.orientation_size(),
+                     " numbers of orientations; give 3 and 4, or no orientation, for "
+                     "each microphone"));
+  }
+  for (const uint32_t microphone : poses.microphone()) {
+    if (microphone < microphone_count) continue;
+    return Invalid("UNKNOWN_MICROPHONE",
+                   absl::StrCat("microphone_poses has microphone ", microphone,
+                                "; the settings have ", microphone_count, ", counted from 0"));
+  }
+  return absl::OkStatus();
+}
+
+Pose ReadPose(const v1::MicrophonePoses& poses, int row) {
+  Pose pose{.position_m = {poses.position_m(3 * row), poses.position_m(3 * row + 1),
+                           poses.position_m(3 * row + 2)}};
+  if (poses.orientation_size() > 0) {
+    pose.orientation = {poses.orientation(4 * row), poses.orientation(4 * row + 1),
+                        poses.orientation(4 * row + 2), poses.orientation(4 * row + 3)};
+  }
+  return pose;
+}
+
+}  // namespace
+
+absl::Status RowsByEnvironment::Sort(std::span<const uint32_t> environments,
+                                     size_t environment_count) {
+  if (!environments.empty() && environments.size() != rows_.size()) {
+    return Invalid("COLUMNS_MISMATCHED",
+                   absl::StrCat("environment has ", environments.size(), " numbers for ",
+                                rows_.size(), " rows; give one for each row, or none"));
+  }
+  const auto environment_of = [&](size_t row) {
+    return environments.empty() ? 0 : environments[row];
+  };
+  for (size_t row = 0; row < rows_.size(); ++row) {
+    if (environment_of(row) >= environment_count) {
+      return Invalid("UNKNOWN_ENVIRONMENT",
+                     absl::StrCat("row ", row, " is of environment ", environment_of(row),
+                                  "; the performance has ", environment_count, ", counted from 0"));
+    }
+    ++first_[environment_of(row) + 1];
+  }
+  for (size_t i = 0; i < environment_count; ++i) first_[i + 1] += first_[i];
+  std::vector<size_t> next(first_.begin(), first_.end() - 1);
+  for (size_t row = 0; row < rows_.size(); ++row) {
+    rows_[next[environment_of(row)]++] = static_cast<int>(row);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PerformRows> PerformRows::Make(const v1::PerformStep& step, size_t environment_count,
+                                              size_t microphone_count) {
+  const auto as_given = [](int a, int b) { return a < b; };
+  RETURN_IF_ERROR(carillon::Validate(step.poses().columns()));
+  ASSIGN_OR_RETURN(
+      RowsByEnvironment poses,
+      RowsByEnvironment::Make(SpanOf(step.poses().environment()),
+                              step.poses().columns().object_size(), environment_count, as_given));
+  RETURN_IF_ERROR(Validate(step.microphone_poses(), microphone_count));
+  ASSIGN_OR_RETURN(RowsByEnvironment microphones,
+                   RowsByEnvironment::Make(SpanOf(step.microphone_poses().environment()),
+                                           step.microphone_poses().microphone_size(),
+                                           environment_count, as_given));
+  PerformRows rows(step, std::move(poses), std::move(microphones));
+  for (const v1::PerformedContacts& contacts : step.contacts()) {
+    const v1::ContactColumns& columns = contacts.columns();
+    RETURN_IF_ERROR(KindOf(columns.kind()).status());
+    RETURN_IF_ERROR(carillon::Validate(columns));
+    ASSIGN_OR_RETURN(const HertzContact hertz, ToHertzContact(columns.hertz()));
+    ASSIGN_OR_RETURN(RowsByEnvironment own,
+                     RowsByEnvironment::Make(SpanOf(contacts.environment()), columns.object_size(),
+                                             environment_count, ByContent(columns)));
+    rows.contacts_.push_back({&columns, hertz, std::move(own)});
+  }
+  return rows;
+}
+
+void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& intake) const {
+  for (const int row : poses_.of(environment)) {
+    const v1::PoseColumns& columns = step_.poses().columns();
+    intake.Move(columns.object(row), ReadRow(columns, row),
+                {.list = "poses", .index = static_cast<uint32_t>(row)});
+  }
+  for (const int row : microphones_.of(environment)) {
+    const v1::MicrophonePoses& poses = step_.microphone_poses();
+    if (poses.microphone(row) == microphone) intake.MoveListener(ReadPose(poses, row));
+  }
+  for (const Contacts& contacts : contacts_) {
+    ReadRows(*contacts.columns, contacts.rows.of(environment), contacts.hertz, intake);
+  }
+}
+
+}  // namespace carillon

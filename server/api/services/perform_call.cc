@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/api/services/perform_call.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <numeric>
+#include <span>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+#include "server/api/call/exchange_call.h"
+#include "server/api/call/status_conversion.h"
+#include "server/api/convert/object_conversion.h"
+#include "server/api/convert/perform_conversion.h"
+#include "server/api/convert/perform_rows.h"
+#include "server/api/convert/sample_bytes.h"
+#include "server/scene/performance.h"
+
+namespace carillon {
+namespace {
+
+/// A message stays below the 4 MiB that gRPC's clients take if they say nothing else.
+constexpr size_t kMostSampleBytes = size_t{2} << 20U;
+/// Objects for which each environment has room, beside those of the settings.
+constexpr size_t kMoreObjects = 64;
+
+absl::Status Malformed(absl::string_view message) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED", message);
+}
+
+/// Takes the settings, then performs one step after the other. A client that thinks for an hour
+/// between two steps keeps its environments.
+class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformResponse> {
+ public:
+  PerformCall(const RenderContext& daemon, grpc::CallbackServerContext& context,
+              RenderPlaces places)
+      : ExchangeCall(context, daemon.pool), daemon_(daemon), places_(std::move(places)) {
+    StartReading();
+  }
+
+ private:
+  absl::Status Take(const v1::PerformRequest& request) override {
+    if (request.has_settings()) return Begin(request.settings());
+    if (performance_ == nullptr) return Malformed("the first request has no settings");
+    if (request.has_reset()) return Reset(request.reset());
+    if (request.has_step()) return Step(request.step());
+    return Malformed("a request has neither settings, reset nor step");
+  }
+
+  absl::Status AllRead() override {
+    ended_ = true;
+    return absl::OkStatus();
+  }
+
+  absl::Status Begin(const v1::PerformSettings& message) {
+    if (performance_ != nullptr) return Malformed("settings were sent twice; they come once");
+    ASSIGN_OR_RETURN(EnvironmentSettings settings, ToEnvironmentSettings(message, daemon_.heads));
+    const size_t count = std::max<size_t>(message.environment_count(), 1);
+    settings.most_objects = 2 * static_cast<size_t>(message.objects_size()) + kMoreObjects;
+    RETURN_IF_ERROR(Performance::Validate(settings, count));
+    environment_bytes_ = Performance::EnvironmentBytes(settings) * count;
+    RETURN_IF_ERROR(GrowMemory());
+    ASSIGN_OR_RETURN(
+        performance_,
+        Performance::Make(settings, count, std::max(std::thread::hardware_concurrency(), 1U),
+                          daemon_.bodies, &daemon_.database.transfers()));
+    begins_ = true;
+    sample_rate_hz_ = settings.sample_rate_hz;
+    microphone_count_ = settings.microphones.size();
+    tells_impacts_ = settings.tells_impacts;
+    for (const v1::PerformedObject& object : message.objects()) RETURN_IF_ERROR(Add(object));
+    return absl::OkStatus();
+  }
+
+  absl::Status GrowMemory() {
+    size_t bytes = environment_bytes_;
+    for (size_t i = 0; performance_ != nullptr && i < performance_->environment_count(); ++i) {
+      bytes += performance_->environment(i).object_bytes();
+    }
+    return places_.memory.Grow(bytes >> 20U);
+  }
+
+  /// Calls `act` with each of the environments of these indices or, if there is none, with all.
+  template <typename Act>
+  absl::Status ForEach(const google::protobuf::RepeatedField<uint32_t>& indices, const Act& act) {
+    for (const uint32_t index : indices) {
+      if (index >= performance_->environment_count()) {
+        return Refusal(absl::StatusCode::kInvalidArgument, "UNKNOWN_ENVIRONMENT",
+                       absl::StrCat("environment ", index, " is unknown; the performance has ",
+                                    performance_->environment_count(), ", counted from 0"));
+      }
+      RETURN_IF_ERROR(act(performance_->environment(index)));
+    }
+    for (size_t i = 0; indices.empty() && i < performance_->environment_count(); ++i) {
+      RETURN_IF_ERROR(act(performance_->environment(i)));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Add(const v1::PerformedObject& added) {
+    ASSIGN_OR_RETURN(const ObjectOfModel object,
+                     ToObject(added.object(), daemon_.database.models()));
+    RETURN_IF_ERROR(ForEach(added.environments(), [&](Environment& environment) {
+      return environment.AddObject(added.object().handle(), object.model, object.properties);
+    }));
+    return GrowMemory();
+  }
+
+  absl::Status Reset(const v1::PerformReset& reset) {
+    return ForEach(reset.environments(),
+                   [](Environment& environment) { return environment.Reset(); });
+  }
+
+  absl::Status Step(const v1::PerformStep& step) {
+    for (const v1::RemovedObject& removed : step.removed_objects()) {
+      RETURN_IF_ERROR(ForEach(removed.environments(), [&](Environment& environment) {
+        return environment.RemoveObject(removed.object());
+      }));
+    }
+    for (const v1::PerformedObject& object : step.added_objects()) RETURN_IF_ERROR(Add(object));
+    ASSIGN_OR_RETURN(const PerformRows rows,
+                     PerformRows::Make(step, performance_->environment_count(), microphone_count_));
+    samples_ =
+        performance_->Step([&rows](size_t environment, size_t microphone, ContactIntake& intake) {
+          rows.Read(environment, microphone, intake);
+        });
+    sent_count_ = 0;
+    answers_ = true;
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<Supply> Fill(v1::PerformResponse& response) override {
+    if (std::exchange(begins_, false)) {
+      FillBegun(*response.mutable_begun());
+    } else if (answers_) {
+      FillSamples(*response.mutable_samples());
+    } else {
+      return ended_ ? Supply::kEnd : Supply::kLater;
+    }
+    return Supply::kMessage;
+  }
+
+  void FillBegun(v1::PerformanceBegun& begun) const {
+    begun.set_sample_rate_hz(sample_rate_hz_);
+    begun.set_channel_count(static_cast<uint32_t>(performance_->channel_count()));
+    begun.set_latency_frames(static_cast<uint32_t>(performance_->latency_frames()));
+  }
+
+  void FillSamples(v1::PerformedSamples& message) {
+    const size_t size = performance_->channel_count() * performance_->frame_count();
+    const size_t most =
+        std::max<size_t>(kMostSampleBytes / sizeof(float) / std::max<size_t>(size, 1), 1);
+    const size_t count = std::min(most, performance_->environment_count() - sent_count_);
+    message.set_first_environment(static_cast<uint32_t>(sent_count_));
+    message.set_environment_count(static_cast<uint32_t>(count));
+    message.set_frame_count(static_cast<uint32_t>(performance_->frame_count()));
+    message.set_samples(ToBytes(samples_.subspan(sent_count_ * size, count * size)));
+    sent_count_ += count;
+    answers_ = sent_count_ < performance_->environment_count();
+    message.set_is_last(!answers_);
+    message.clear_impacts();
+    if (!answers_) FillFindings(message);
+  }
+
+  void FillFindings(v1::PerformedSamples& message) {
+    uint64_t rejected_count = 0;
+    absl::Status last_rejection;
+    for (size_t i = 0; i < performance_->environment_count(); ++i) {
+      Environment& environment = performance_->environment(i);
+      const uint64_t count = environment.rejected_count();
+      rejected_count += count;
+      if (count > 0 && !environment.last_rejection().ok()) {
+        last_rejection = environment.last_rejection();
+      }
+      if (!tells_impacts_) continue;
+      for (const BlowRecord& impact : environment.TakeImpacts()) {
+        AddImpact(static_cast<uint32_t>(i), impact, *message.mutable_impacts());
+      }
+    }
+    message.set_rejected_count(rejected_count);
+    message.clear_last_rejection();
+    if (!last_rejection.ok())
+      *message.mutable_last_rejection() = ToLegibleErrorInfo(last_rejection);
+  }
+
+  const RenderContext daemon_;
+  RenderPlaces places_;
+  std::unique_ptr<Performance> performance_;
+  size_t environment_bytes_ = 0;
+  uint32_t sample_rate_hz_ = 0;
+  size_t microphone_count_ = 0;
+  bool tells_impacts_ = false;
+  bool begins_ = false;   // whether PerformanceBegun is to be sent
+  bool answers_ = false;  // whether samples are to be sent
+  bool ended_ = false;
+  std::span<const float> samples_;  // of the last step
+  size_t sent_count_ = 0;           // environments whose samples were sent
+};
+
+}  // namespace
+
+grpc::ServerBidiReactor<grpc::ByteBuffer, v1::PerformResponse>* MakePerformCall(
+    const RenderContext& daemon, grpc::CallbackServerContext& context, RenderPlaces places) {
+  return new PerformCall(daemon, context, std::move(places));
+}
+
+}  // namespace carillon

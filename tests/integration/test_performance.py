@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lock step: the samples of each step come before the next, by the Python package and the real daemon."""
+
+import asyncio
+import unittest
+
+import numpy
+
+import carillon
+import meshes
+from daemon import DaemonTest
+
+BAR = meshes.box(meshes.BAR_SIZE)
+POINT, IMPULSE, DURATION_S = (0.0, 0.008, 0.010), (0, 0, -0.002), 1e-4
+STEP_S, RATE_HZ = 0.02, 48000
+FRAMES = round(STEP_S * RATE_HZ)
+ABOVE = (0, 0, 1.5)
+
+
+def strikes(step, environments):
+    """The blows of a step, other ones in each environment of seven."""
+    struck = [i for i in environments if (step + i % 7) % 3 == 0]
+    if not struck:
+        return None
+    size = 1 + 0.1 * (numpy.array(struck) % 7)
+    return carillon.Impacts(1, [POINT] * len(struck), numpy.outer(size, IMPULSE), durations=DURATION_S,
+                            time_offsets=0.0013, environments=struck)
+
+
+class PerformanceTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.c = carillon.connect(cls.daemon.server)
+        cls.addClassCleanup(cls.c.close)
+        cls.model = cls.c.create_model(BAR, meshes.MATERIAL, label="bar", without_transfer=True)
+
+    def begin(self, environments=1, microphones=(carillon.Omni(at=ABOVE),), **settings):
+        sound = self.enterContext(self.c.perform(step=STEP_S, environments=environments, microphones=microphones,
+                                                 **settings))
+        sound.add(self.model)
+        return sound
+
+    def heard(self, environments, steps=20, shuffle=False, **settings):
+        settings = {"microphones": [carillon.Omni(at=ABOVE)], **settings}
+        order = list(range(environments))[::-1] if shuffle else range(environments)
+        with self.c.perform(step=STEP_S, environments=environments, **settings) as sound:
+            sound.add(self.model)
+            return numpy.concatenate([sound.step(impacts=strikes(k, order))[0] for k in range(1, steps + 1)], axis=2)
+
+    def test_the_same_bits_for_any_number_of_environments_and_order_of_rows(self):
+        seven = self.heard(7)
+        self.assertEqual((seven.shape, seven.dtype), ((7, 1, 20 * FRAMES), numpy.float32))
+        self.assertGreater(abs(seven).max(), 0.01)
+        numpy.testing.assert_array_equal(self.heard(1), seven[:1])
+        numpy.testing.assert_array_equal(self.heard(64), seven[numpy.arange(64) % 7])
+        numpy.testing.assert_array_equal(self.heard(64, shuffle=True), seven[numpy.arange(64) % 7])
+
+    def test_the_same_bits_as_a_rendering_of_its_trace(self):
+        performed = self.heard(1, latency=0.05, full_scale_pa=200, hearing={"distance_gain": True})
+        trace = carillon.Trace(STEP_S, hearing={"distance_gain": True}, listener=ABOVE)
+        trace.header.clock.scheduling_delay_s = 0.05
+        trace.add(self.model)
+        for k in range(1, 21):
+            blow = strikes(k, [0])
+            trace.step(k * STEP_S, impacts=blow and carillon.Impacts(1, blow.points, blow.impulses,
+                                                                     durations=DURATION_S, time_offsets=0.0013))
+        rendered = self.c.render(trace, tail_s=1, full_scale_pa=200)
+        numpy.testing.assert_array_equal(performed[0, 0], rendered.samples[:performed.shape[2], 0])
+        self.assertEqual(rendered.summary.limited_frame_count, 0)
+
+    def test_samples_are_pascals_and_impacts_are_labels(self):
+        sound = self.begin(2, tell_impacts=True)
+        self.assertEqual((sound.sample_rate_hz, sound.channel_count, sound.latency), (RATE_HZ, 1, 0))
+        samples, impacts = sound.step(impacts=carillon.Impacts(1, [POINT], [IMPULSE], durations=DURATION_S,
+                                                               environments=[1]))
+        self.assertFalse(samples.any())  # the step's contacts sound from its end on
+        self.assertFalse(samples.flags.writeable)
+        self.assertEqual((impacts.environments.tolist(), impacts.objects.tolist()), ([1], [1]))
+        self.assertAlmostEqual(impacts.times[0], STEP_S, delta=1e-9)
+        numpy.testing.assert_allclose(impacts.impulses[0], IMPULSE, atol=1e-9)
+        numpy.testing.assert_allclose(impacts.points[0], POINT, atol=1e-3)
+        samples, impacts = sound.step()
+        self.assertEqual(len(impacts), 0)
+        self.assertFalse(samples[0].any())
+        trace = carillon.Trace(STEP_S)
+        trace.add(self.model)
+        trace.step(0, impacts=carillon.Impacts(1, [POINT], [IMPULSE], durations=DURATION_S))
+        at_1_m = self.c.render(trace, tail_s=0.1)
+        peak_pa = abs(at_1_m.samples[:FRAMES - 200]).max() * at_1_m.summary.full_scale_pa
+        # The voice is a block late.
+        self.assertAlmostEqual(abs(samples[1]).max() * 1.5 / peak_pa, 1, delta=0.01)
+
+    def test_a_reset_is_silence_and_a_new_beginning(self):
+        sound = self.begin(2)
+        first = [sound.step(impacts=strikes(k, [0, 1]))[0] for k in range(1, 10)]
+        sound.reset(1)
+        again = [sound.step(impacts=strikes(k, [0, 1]))[0] for k in range(1, 10)]
+        self.assertFalse(again[0][1].any())
+        self.assertTrue(again[0][0].any())
+        numpy.testing.assert_array_equal([s[1] for s in again], [s[1] for s in first])
+
+    def test_an_impact_is_found_among_reported_contacts(self):
+        sound = self.begin(tell_impacts=True, frame="scene")
+        told = []
+        for k in range(1, 60):
+            impulse = 0.002 if k == 5 else 0.0004 if k > 5 else 0
+            contacts = carillon.Contacts(1, [POINT], [(0, 0, -impulse)], partners=7) if impulse else None
+            _, impacts = sound.step(contacts=contacts, poses=carillon.Poses([1], [(0, 0, 0)]))
+            told += [(k, *impulse) for impulse in impacts.impulses]
+        self.assertEqual(len(told), 1)
+        self.assertAlmostEqual(told[0][3], -0.002, delta=2e-4)
+
+    def test_microphones_of_all_kinds_at_once(self):
+        sound = self.begin(3, microphones=[
+            carillon.Omni(at=ABOVE), carillon.Stereo(at=ABOVE), carillon.Ambisonics(at=(2, 0, 0), order=3),
+            carillon.Omni(at=(0, 0, 1), on=1)])
+        self.assertEqual(sound.channel_count, 1 + 2 + 16 + 1)
+        sound.step(impacts=carillon.Impacts(1, [POINT] * 3, [IMPULSE] * 3, durations=DURATION_S, environments=range(3)),
+                   poses=carillon.Poses([1] * 3, [(0, 0, 0)] * 3, environments=range(3)))
+        samples, _ = sound.step()
+        self.assertEqual(samples.shape, (3, 20, FRAMES))
+        numpy.testing.assert_array_equal(samples[0], samples[2])
+        peaks = abs(samples[0]).max(axis=1)
+        numpy.testing.assert_allclose(peaks[0] * 1.5, peaks[19], rtol=1e-3)  # on the bar at 1 m, and at 1.5 m
+        # The bar is at the left of the ambisonic microphone, which looks along -z.
+        numpy.testing.assert_allclose(samples[0, 4], samples[0, 3], rtol=1e-5)
+        self.assertLess(peaks[5], 1e-3 * peaks[3])
+
+    def test_steps_come_in_several_messages_and_do_not_drift(self):
+        with self.c.perform(step=1 / 90, environments=900, microphones=[carillon.Omni()] * 2) as sound:
+            counts = [sound.step()[0].shape for _ in range(9)]
+            self.assertEqual({shape[:2] for shape in counts}, {(900, 2)})
+            self.assertEqual(sum(shape[2] for shape in counts), 4800)
+            self.assertEqual(round(sound.latency * RATE_HZ), 16)
+
+    def test_mistakes_are_refused(self):
+        def reason_of(act):
+            with self.assertRaises(carillon.CarillonError) as refused:
+                act()
+            return refused.exception.reason
+
+        def impact(item, **more):
+            return carillon.Impacts(item, [POINT], [IMPULSE], durations=DURATION_S, **more)
+
+        sound = self.begin()
+        self.assertEqual(reason_of(lambda: sound.step(impacts=impact(9))), "OBJECT_NOT_FOUND")
+        sound.step(impacts=impact(1))  # it goes on
+        self.assertEqual(reason_of(lambda: sound.step(impacts=impact(1, environments=[1]))), "UNKNOWN_ENVIRONMENT")
+        for settings, reason in ((dict(environments=5000), "INVALID_SETTINGS"), (dict(latency=1), "INVALID_SETTINGS"),
+                                 (dict(microphones=[carillon.Ambisonics(order=4)]), "INVALID_SETTINGS"),
+                                 (dict(sample_rate_hz=10), "INVALID_SETTINGS")):
+            with self.subTest(settings):
+                self.assertEqual(reason_of(lambda settings=settings: self.begin(**settings)), reason)
+        with self.assertRaises(ValueError):
+            carillon.Trace(STEP_S).step(0, impacts=impact(1, environments=[0]))
+        with self.assertRaises(TypeError):
+            self.c.perform(step=STEP_S, channels=2)
+
+    def test_asyncio_and_the_shape_of_gymnasium(self):
+        async def perform():
+            async with carillon.aio.connect(self.daemon.server) as c:
+                async with c.perform(step=STEP_S, microphones=[carillon.Omni(at=ABOVE)]) as sound:
+                    sound.add(self.model.name, meshes.MATERIAL)
+                    return [(await sound.step(impacts=strikes(k, [0])))[0] for k in range(1, 6)]
+
+        numpy.testing.assert_array_equal(numpy.concatenate(asyncio.run(perform()), axis=2), self.heard(1, 5))
+
+        class Falling:
+            observation_space, action_space = "poses", None
+
+            def reset(self, seed=None, options=None):
+                self.count = 0
+                return 0.0, {}
+
+            def step(self, action):
+                self.count += 1
+                return 0.0, 1.0, self.count == 5, False, {"count": self.count}
+
+        hearing = carillon.HearingEnvironment(Falling(), self.begin(), lambda env: {"impacts": strikes(env.count, [0])})
+        self.assertEqual(hearing.observation_space["sound"]["shape"], (1, FRAMES))
+        episodes = []
+        for _ in range(2):
+            observation, _ = hearing.reset()
+            self.assertFalse(observation["sound"].any())
+            ended, sounds = False, []
+            while not ended:
+                observation, _, ended, _, info = hearing.step(None)
+                sounds.append(observation["sound"])
+            episodes.append(numpy.concatenate(sounds, axis=1))
+            self.assertEqual(info["count"], 5)
+        numpy.testing.assert_array_equal(episodes[0], episodes[1])
+        numpy.testing.assert_array_equal(episodes[0], self.heard(1, 5)[0])
+
+
+if __name__ == "__main__":
+    unittest.main()

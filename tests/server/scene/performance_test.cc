@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server/scene/performance.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "server/scene/offline_renderer.h"
+#include "tests/server/scene/small_model.h"
+#include "tests/server/synthesis/voice/sphere_head.h"
+
+namespace carillon {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr uint32_t kRate = 48000;
+constexpr double kStepS = 0.02;
+
+/// Impulses of step k of an environment; environments of the same kind have the same impulses.
+std::vector<ObjectImpulse> ImpulsesOf(size_t kind, int step) {
+  if ((step + static_cast<int>(kind)) % 3 != 0) return {};
+  ObjectImpulse lasting = SmallImpulse(1, 0.1 + 0.01 * static_cast<double>(kind), 0.0013);
+  lasting.contact.impulse.duration_s = 0.001;
+  return {SmallImpulse(2, 0.2), lasting};
+}
+
+class PerformanceTest : public testing::Test {
+ protected:
+  std::unique_ptr<Performance> Make(const EnvironmentSettings& settings, size_t environment_count,
+                                    size_t thread_count = 1) {
+    auto performance = *Performance::Make(settings, environment_count, thread_count, bodies_);
+    for (size_t i = 0; i < environment_count; ++i) Fill(performance->environment(i));
+    return performance;
+  }
+
+  void Fill(Environment& environment) {
+    ObjectProperties larger = SmallProperties();
+    larger.material.size = 1.7;
+    larger.pose = Pose{.position_m = {0.5, 0, 0}};
+    ASSERT_TRUE(environment.AddObject(1, model_, SmallProperties()).ok());
+    ASSERT_TRUE(environment.AddObject(2, model_, larger).ok());
+  }
+
+  /// Returns the sound of each environment, [channel][frame] of one step after the other.
+  /// Environment i has the impulses of kind i % 7.
+  static std::vector<std::vector<float>> Perform(Performance& performance, int step_count) {
+    const size_t count = performance.environment_count();
+    std::vector<std::vector<float>> sounds(count);
+    for (int step = 1; step <= step_count; ++step) {
+      const auto samples = performance.Step([&](size_t environment, size_t, ContactIntake& intake) {
+        intake.Strike(ImpulsesOf(environment % 7, step));
+      });
+      const size_t size = samples.size() / count;
+      for (size_t i = 0; i < count; ++i) {
+        const auto own = samples.subspan(i * size, size);
+        sounds[i].insert(sounds[i].end(), own.begin(), own.end());
+      }
+    }
+    return sounds;
+  }
+
+  BodyCache bodies_;
+  std::shared_ptr<const ModalModel> model_ = SmallModel();
+};
+
+EnvironmentSettings SettingsWith(double latency_s, const Microphone& microphone = {}) {
+  return {.sample_rate_hz = kRate,
+          .step_s = kStepS,
+          .latency_s = latency_s,
+          .microphones = {microphone},
+          .hearing = {.distance_gain = true, .reference_distance_m = 0.1}};
+}
+
+float LargestOf(std::span<const float> samples) {
+  float largest = 0;
+  for (const float sample : samples) largest = std::max(largest, std::abs(sample));
+  return largest;
+}
+
+TEST_F(PerformanceTest, IsBitForBitTheSameForAnyNumberOfEnvironmentsAndThreads) {
+  for (const double latency_s : {0.0, 0.05}) {
+    const auto settings = SettingsWith(latency_s, {.pose = {.position_m = {0, 1, 0}}});
+    const auto seven = Perform(*Make(settings, 7), 30);
+    EXPECT_GT(LargestOf(seven[0]), 0.1);
+    EXPECT_NE(seven[0], seven[1]);
+    EXPECT_EQ(Perform(*Make(settings, 1), 30)[0], seven[0]);
+    for (const size_t thread_count : {1U, 2U, 4U}) {
+      const auto many = Perform(*Make(settings, 64, thread_count), 30);
+      for (size_t i = 0; i < many.size(); ++i) EXPECT_EQ(many[i], seven[i % 7]) << i;
+    }
+  }
+}
+
+TEST_F(PerformanceTest, IsBitForBitAnOfflineRenderingOfItsTrace) {
+  constexpr int kSteps = 30;
+  auto settings = SettingsWith(0.05, {.pose = {.position_m = {0, 1, 0}}});
+  settings.full_scale_pa = 200;
+  const std::vector<float> performed = Perform(*Make(settings, 1), kSteps)[0];
+  const auto offline = *OfflineRenderer::Make(
+      {.sample_rate_hz = kRate,
+       .tail_s = 1,
+       .gain = 10,
+       .full_scale_pa = 200,
+       .step_s = kStepS,
+       .space = {.hearing = settings.hearing, .listener = settings.microphones[0].pose},
+       .mapping = {.delay_s = 0.05}},
+      bodies_);
+  ObjectProperties larger = SmallProperties();
+  larger.material.size = 1.7;
+  larger.pose = Pose{.position_m = {0.5, 0, 0}};
+  ASSERT_TRUE(offline->forward().AddObject(1, model_, SmallProperties()).ok());
+  ASSERT_TRUE(offline->forward().AddObject(2, model_, larger).ok());
+  for (int step = 1; step <= kSteps; ++step) {
+    ASSERT_TRUE(offline->intake().BeginStep(step * kStepS).ok());
+    offline->intake().Strike(ImpulsesOf(0, step));
+    offline->intake().EndStep();
+  }
+  offline->forward().Finish();
+  std::vector<float> rendered((performed.size() + 127) / 128 * 128);
+  ASSERT_EQ(offline->Render(rendered), rendered.size());
+  rendered.resize(performed.size());
+  EXPECT_EQ(offline->summary().limited_frame_count, 0U);
+  EXPECT_EQ(performed, rendered);
+}
+
+/// Step k is heard from its end on.
+TEST_F(PerformanceTest, AContactSoundsFromTheEndOfItsStepPlusTheLatency) {
+  for (const double latency_s : {0.0, 0.001, 0.05}) {
+    const auto performance = Make(SettingsWith(latency_s), 1);
+    const auto latency_frames = static_cast<size_t>(std::llround(latency_s * kRate));
+    EXPECT_EQ(performance->latency_frames(), latency_frames);
+    std::vector<float> sound;
+    for (int step = 1; step <= 5; ++step) {
+      const auto samples = performance->Step([&](size_t, size_t, ContactIntake& intake) {
+        if (step == 1) intake.Strike(SmallImpulse(1));
+      });
+      sound.insert(sound.end(), samples.begin(), samples.end());
+    }
+    EXPECT_EQ(sound.size(), 5 * 960U);
+    const auto onset = std::ranges::find_if(sound, [](float x) { return x != 0; });
+    const auto frame = static_cast<size_t>(onset - sound.begin());
+    EXPECT_GE(frame, 960 + latency_frames);
+    // sin(0) is silent, and the voice is a block late.
+    EXPECT_LE(frame,
+              960 + latency_frames + 1 + TimingOf(SettingsWith(latency_s)).block_frame_count);
+  }
+}
+
+/// 1/90 s at 48 kHz is 533 1/3 frames.
+TEST_F(PerformanceTest, StepsThatAreNoWholeNumberOfFramesDoNotDrift) {
+  EnvironmentSettings settings = SettingsWith(0);
+  settings.step_s = 1.0 / 90;
+  const auto performance = Make(settings, 2);
+  EXPECT_EQ(performance->latency_frames(), 16U);
+  std::vector<size_t> counts;
+  for (int step = 0; step < 90; ++step) {
+    performance->Step([](size_t, size_t, ContactIntake&) {});
+    counts.push_back(performance->frame_count());
+  }
+  EXPECT_EQ(std::vector<size_t>(counts.begin(), counts.begin() + 4),
+            (std::vector<size_t>{533, 534, 533, 533}));
+  EXPECT_EQ(std::reduce(counts.begin(), counts.end()), 48000U);
+}
+
+TEST_F(PerformanceTest, AResetIsSilenceAtOnceAndThenTheSoundOfANewEnvironment) {
+  const auto settings = SettingsWith(0, {.pose = {.position_m = {0, 1, 0}}});
+  const auto performance = Make(settings, 2);
+  const auto before = Perform(*performance, 10);
+  EXPECT_NE(before[1].back(), 0);
+  ASSERT_TRUE(performance->environment(1).Reset().ok());
+  const auto after = Perform(*performance, 10);
+  EXPECT_EQ(LargestOf(std::span(after[1]).first(960)), 0);
+  const auto anew = Perform(*Make(settings, 2), 20);
+  EXPECT_EQ(after[1], std::vector<float>(anew[1].begin(), anew[1].begin() + 9600));
+  EXPECT_EQ(after[0].size(), 9600U);
+  EXPECT_NE(after[0].front(), 0);  // the other environment rings on
+}
+
+TEST_F(PerformanceTest, LevelsFallWithTheDistance) {
+  const auto peak_at = [&](double distance_m) {
+    return LargestOf(
+        Perform(*Make(SettingsWith(0, {.pose = {.position_m = {0, distance_m, 0}}}), 1), 20)[0]);
+  };
+  // Object 2 lies 0.5 m aside.
+  const double near = peak_at(5), far = peak_at(10);
+  EXPECT_NEAR(near / far, 2, 0.01);
+}
+
+TEST_F(PerformanceTest, AMicrophoneMovesWithTheObjectThatCarriesIt) {
+  const auto fixed = Make(SettingsWith(0, {.pose = {.position_m = {3, 2, 0}}}), 1);
+  auto carried_settings = SettingsWith(0, {.pose = {.position_m = {2, 0, 0}}, .object = 3});
+  const auto carried = Make(carried_settings, 1);
+  ObjectProperties body = SmallProperties();
+  // Turned by 90 degrees about z, so that its x axis is the scene's y axis.
+  body.pose = Pose{.position_m = {3, 0, 0}, .orientation = {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}};
+  ASSERT_TRUE(carried->environment(0).AddObject(3, model_, body).ok());
+  // The microphone jumps in the first step.
+  fixed->Step([](size_t, size_t, ContactIntake&) {});
+  carried->Step([](size_t, size_t, ContactIntake&) {});
+  const std::vector<float> a = Perform(*fixed, 20)[0], b = Perform(*carried, 20)[0];
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t n = 0; n < a.size(); ++n) ASSERT_NEAR(a[n], b[n], 1e-5 * LargestOf(a));
+}
+
+TEST_F(PerformanceTest, AmbisonicsHearTheDirectionAndThePressure) {
+  // Object 1 alone at the left of a microphone that looks along -z.
+  const Microphone ambisonic{.kind = MicrophoneKind::kAmbisonic, .ambisonic_order = 3};
+  auto settings = SettingsWith(0, ambisonic);
+  const auto performance = *Performance::Make(settings, 1, 1, bodies_);
+  ObjectProperties left = SmallProperties();
+  left.pose = Pose{.position_m = {-2, 0, 0}};
+  ASSERT_TRUE(performance->environment(0).AddObject(1, model_, left).ok());
+  EXPECT_EQ(performance->channel_count(), 16U);
+  const auto samples = performance->Step([](size_t, size_t, ContactIntake&) {});
+  EXPECT_EQ(samples.size(), 16 * 960U);
+  performance->Step([](size_t, size_t, ContactIntake& i) { i.Strike(SmallImpulse(1)); });
+  const auto sound = performance->Step([](size_t, size_t, ContactIntake&) {});
+  const auto channel = [&](size_t c) { return sound.subspan(c * 960, 960); };
+  const float w = LargestOf(channel(0));
+  ASSERT_GT(w, 0);
+  EXPECT_EQ(std::vector<float>(channel(1).begin(), channel(1).end()),
+            std::vector<float>(channel(0).begin(), channel(0).end()));  // y is the left
+  EXPECT_EQ(LargestOf(channel(2)), 0);
+  EXPECT_EQ(LargestOf(channel(3)), 0);
+  EXPECT_FLOAT_EQ(LargestOf(channel(6)), w / 2);
+  EXPECT_NEAR(LargestOf(channel(8)), std::sqrt(0.75) * w, 1e-6 * w);
+  EXPECT_NEAR(LargestOf(channel(9)), std::sqrt(5.0 / 8) * w, 1e-6 * w);
+}
+
+TEST_F(PerformanceTest, EarsHearTheNearerSideLouder) {
+  auto settings = SettingsWith(0, {.kind = MicrophoneKind::kEars});
+  settings.head = std::make_shared<const Head>(SphereHead::Make());
+  const auto performance = *Performance::Make(settings, 1, 1, bodies_);
+  ObjectProperties right = SmallProperties();
+  right.pose = Pose{.position_m = {2, 0, 0}};
+  ASSERT_TRUE(performance->environment(0).AddObject(1, model_, right).ok());
+  performance->Step([](size_t, size_t, ContactIntake& i) { i.Strike(SmallImpulse(1)); });
+  const auto sound = performance->Step([](size_t, size_t, ContactIntake&) {});
+  ASSERT_EQ(sound.size(), 2 * 960U);
+  EXPECT_GT(LargestOf(sound.subspan(960)), LargestOf(sound.first(960)));
+  EXPECT_GT(LargestOf(sound.first(960)), 0);
+}
+
+TEST_F(PerformanceTest, TellsImpactsAtTheirTimesWithoutTheLatency) {
+  auto settings = SettingsWith(0.05);
+  settings.tells_impacts = true;
+  const auto performance = Make(settings, 2);
+  const auto perform = [&](bool strikes) {
+    performance->Step([&](size_t environment, size_t, ContactIntake& intake) {
+      if (strikes && environment == 1) intake.Strike(SmallImpulse(2, 0.5, 0.003));
+    });
+  };
+  perform(false);
+  perform(true);
+  EXPECT_TRUE(performance->environment(0).TakeImpacts().empty());
+  const auto impacts = performance->environment(1).TakeImpacts();
+  ASSERT_EQ(impacts.size(), 1U);
+  EXPECT_EQ(impacts[0].handle, 2U);
+  EXPECT_NEAR(impacts[0].time_s, 0.043, 1e-9);
+  EXPECT_FLOAT_EQ(impacts[0].impulse_newton_seconds[0], 0.5F);
+  EXPECT_TRUE(performance->environment(1).TakeImpacts().empty());
+}
+
+TEST_F(PerformanceTest, ARemovedObjectFallsSilentAndItsContactsAreRejected) {
+  const auto performance = Make(SettingsWith(0), 1);
+  const auto strike = [](size_t, size_t, ContactIntake& intake) { intake.Strike(SmallImpulse(1)); };
+  performance->Step(strike);
+  performance->Step([](size_t, size_t, ContactIntake&) {});
+  ASSERT_TRUE(performance->environment(0).RemoveObject(1).ok());
+  for (int i = 0; i < 10; ++i) performance->Step([](size_t, size_t, ContactIntake&) {});
+  EXPECT_EQ(LargestOf(performance->Step([](size_t, size_t, ContactIntake&) {})), 0);
+  performance->Step(strike);
+  EXPECT_EQ(performance->environment(0).rejected_count(), 1U);
+  EXPECT_THAT(performance->environment(0).last_rejection().ToString(),
+              HasSubstr("OBJECT_NOT_FOUND: "));
+  ASSERT_TRUE(performance->environment(0).Reset().ok());
+  EXPECT_EQ(performance->environment(0).rejected_count(), 1U);
+}
+
+TEST_F(PerformanceTest, MoreEventsThanFitAreRejectedAndNotLostWithoutAWord) {
+  const auto performance = Make(SettingsWith(0), 1);
+  performance->Step([](size_t, size_t, ContactIntake& intake) {
+    for (int i = 0; i < 3000; ++i) intake.Strike(SmallImpulse(1, 1e-4, 1e-7 * i));
+  });
+  performance->Step([](size_t, size_t, ContactIntake&) {});
+  EXPECT_GT(performance->environment(0).rejected_count(), 2000U);
+  EXPECT_THAT(performance->environment(0).last_rejection().ToString(),
+              HasSubstr("TOO_MANY_CONTACTS: "));
+}
+
+TEST_F(PerformanceTest, RefusesSettingsOutOfRange) {
+  const auto refusal = [&](const EnvironmentSettings& settings, size_t count) {
+    return Performance::Make(settings, count, 1, bodies_).status().ToString();
+  };
+  EXPECT_THAT(refusal(SettingsWith(0.2), 1), HasSubstr("INVALID_SETTINGS: latency_s"));
+  EXPECT_THAT(refusal(SettingsWith(0), 4097), HasSubstr("INVALID_SETTINGS: environment_count"));
+  EnvironmentSettings settings = SettingsWith(0);
+  settings.step_s = 2;
+  EXPECT_THAT(refusal(settings, 1), HasSubstr("INVALID_SETTINGS: step_s"));
+  settings = SettingsWith(0);
+  settings.microphones.clear();
+  EXPECT_THAT(refusal(settings, 1), HasSubstr("INVALID_SETTINGS: the number of microphones"));
+}
+
+}  // namespace
+}  // namespace carillon
