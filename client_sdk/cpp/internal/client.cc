@@ -287,6 +287,10 @@ absl::StatusOr<v1::RenderSummary> Client::Render(
   return NotOverridden("Render");
 }
 
+absl::StatusOr<std::unique_ptr<Performance>> Client::Perform(const v1::PerformSettings&) const {
+  return NotOverridden("Perform");
+}
+
 absl::StatusOr<v1::GetMixerResponse> Client::GetMixer() const {
   v1::GetMixerResponse response;
   RETURN_IF_ERROR(Call("AudioService/GetMixer", v1::GetMixerRequest(), response));

@@ -22,6 +22,7 @@
 #include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/block_reader.h"
 #include "client_sdk/cpp/internal/contact_stream_call.h"
+#include "client_sdk/cpp/internal/performance_call.h"
 #include "client_sdk/cpp/internal/rpc_status.h"
 #include "client_sdk/cpp/internal/whole_file.h"
 #include "proto/cpp/error_reason.h"
@@ -181,6 +182,13 @@ absl::StatusOr<std::unique_ptr<ContactStream>> GrpcClient::StreamContacts(
   auto context = std::make_unique<grpc::ClientContext>();
   Prepare(*context);
   return OpenContactStream(stubs_->contacts, stubs_->server, std::move(context), start);
+}
+
+absl::StatusOr<std::unique_ptr<Performance>> GrpcClient::Perform(
+    const v1::PerformSettings& settings) const {
+  auto context = std::make_unique<grpc::ClientContext>();
+  Prepare(*context);
+  return OpenPerformance(stubs_->audio, stubs_->server, std::move(context), settings);
 }
 
 absl::StatusOr<bool> GrpcClient::IsServing(const std::string& service) const {

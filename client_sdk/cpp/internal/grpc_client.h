@@ -64,6 +64,9 @@ class GrpcClient final : public Client {
       const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
       const std::function<void(const v1::Blow&)>& on_blow) const override;
 
+  absl::StatusOr<std::unique_ptr<Performance>> Perform(
+      const v1::PerformSettings& settings) const override;
+
   absl::Status BackUpDatabase(const std::string& file) const override;
 
  protected:

@@ -16,6 +16,7 @@
 #include "carillon/audio.h"
 #include "carillon/contact_stream.h"
 #include "carillon/contact_trace.h"
+#include "carillon/performance.h"
 #include "carillon/v1/admin_service.pb.h"
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
@@ -232,6 +233,11 @@ class Client {
   virtual absl::StatusOr<v1::RenderSummary> Render(
       const v1::RenderSettings& settings, ContactTraceReader& trace, const AudioCallback& on_block,
       const std::function<void(const v1::Blow&)>& on_blow = nullptr) const;
+
+  /// Begins environments whose sound comes in step with their simulation, and waits for the
+  /// daemon's answer to `settings`.
+  virtual absl::StatusOr<std::unique_ptr<Performance>> Perform(
+      const v1::PerformSettings& settings) const;
 
   /// Returns the state of the mixer and the audio device.
   virtual absl::StatusOr<v1::GetMixerResponse> GetMixer() const;
