@@ -12,6 +12,7 @@ const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { toMaterial } = require('./materials');
 const { toMeshFile } = require('./meshes');
 const { Model, isTransfer } = require('./models');
+const { Performance } = require('./performing');
 const { Places, mostRenderings } = require('./places');
 const { stateOf } = require('./progress');
 const { Scene } = require('./scenes');
@@ -287,6 +288,15 @@ class Client {
       throw error;
     });
     return places.use(() => this.renderTrace(whole, settings));
+  }
+
+  /**
+   * Performs environments that are simulated in step: each step gives its samples before the next. `settings` are step,
+   * the duration of a step in seconds, and environments, microphones such as { kind: 'omni', pose: [0, 0, 1.5] }, latency
+   * in seconds, frame, pulseShape, sampleRateHz, fullScalePa, hearing and tellImpacts.
+   */
+  perform(settings) {
+    return new Performance(this, settings).begin();
   }
 
   async renderTrace(whole, settings) {

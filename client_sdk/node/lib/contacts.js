@@ -279,5 +279,5 @@ function objectsOf(content) {
   return rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
 }
 
-module.exports = { countRows, given, makeStep, objectsOf, present, refuseTime, strikeOf, toHandle,
-  toPose };
+module.exports = { contactColumns, countRows, given, makeStep, objectsOf, poseColumns, present, refuseTime, strikeOf,
+  toHandle, toPose };

@@ -16,6 +16,7 @@ import type { ListenRequest } from '../types/carillon/v1/ListenRequest';
 import type { ListModalModelsRequest } from '../types/carillon/v1/ListModalModelsRequest';
 import type { Material as MaterialMessage } from '../types/carillon/v1/Material';
 import type { ModalModelSummary__Output } from '../types/carillon/v1/ModalModelSummary';
+import type { PerformedImpacts__Output } from '../types/carillon/v1/PerformedImpacts';
 import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
 import type { Remedy__Output } from '../types/carillon/v1/Remedy';
 import type { Blow__Output } from '../types/carillon/v1/Blow';
@@ -115,6 +116,43 @@ export interface Contacts extends Impacts, ContactRoughness {
 export interface ContactForces extends ContactPlaces, ContactRoughness {
   /** Newtons. */
   forces: Table;
+}
+
+/** Columns with the environment of each row of a performance, by default 0. */
+export type OfEnvironments<Columns> = Columns & { environments?: ArrayLike<number> };
+
+/** A microphone at a pose in the scene, or in the frame of the object `on`. It looks along -z of its frame. */
+export interface Microphone {
+  kind?: 'omni' | 'stereo' | 'ears' | 'ambisonic';
+  /** Order of ambisonics, 1 to 3. */
+  order?: number;
+  pose?: Pose;
+  /** Handle of the object that carries it. */
+  on?: number;
+}
+
+/** Environments whose sound comes in step with their simulation. */
+export class Performance {
+  readonly environmentCount: number;
+  readonly channelCount: number;
+  readonly sampleRateHz: number;
+  /** Seconds from a contact to its sound. */
+  readonly latency: number;
+  /** Adds an object before the contacts of the next step, by default to all environments. Returns its handle. */
+  add(model: Model | string, settings?: {
+    environments?: number | Iterable<number>; material?: Material; size?: number; gain?: number; pose?: Pose;
+    handle?: number; radiation?: Radiation;
+  }): number;
+  /** Removes an object at the next step. */
+  remove(object: number, environments?: number | Iterable<number>): void;
+  /** Silence at once, and time zero. */
+  reset(environments?: number | Iterable<number>): void;
+  /** Performs a step. Samples are [environment][channel][frame]. Throws CarillonError if a contact is rejected. */
+  step(content?: {
+    contacts?: OfEnvironments<Contacts>; impacts?: OfEnvironments<Impacts>; forces?: OfEnvironments<ContactForces>;
+    poses?: OfEnvironments<NonNullable<StepContent['poses']>>;
+  }): Promise<{ samples: Float32Array; frameCount: number; impacts: PerformedImpacts__Output | null }>;
+  close(): void;
 }
 
 /** What a step has. */
@@ -349,6 +387,12 @@ export class Client {
   scenes(): Promise<Scene[]>;
   /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
+  /** Begins environments whose sound comes in step with their simulation. `step` is in seconds. */
+  perform(settings: {
+    step: number; environments?: number; microphones?: Microphone[]; latency?: number; frame?: 'object' | 'scene';
+    pulseShape?: 'raised_cosine' | 'gaussian'; sampleRateHz?: number; fullScalePa?: number; hearing?: Hearing;
+    tellImpacts?: boolean;
+  }): Promise<Performance>;
   /** Begins to record what the daemon plays. Returns once it does. */
   listen(request?: ListenRequest): Promise<Recording>;
   /**

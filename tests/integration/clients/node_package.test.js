@@ -283,6 +283,32 @@ test('more renderings than a client may have wait', async () => {
   assert.equal(new Set(sounds.map((sound) => sound.peak)).size, 1);
 });
 
+test('a performance gives the samples of each step, the same again after a reset, and refuses unknown objects', async () => {
+  const sound = await c.perform({ step: 0.02, environments: 2, microphones: [{ pose: [0, 0, 1.5] }, { kind: 'stereo' }],
+    tellImpacts: true });
+  assert.deepEqual([sound.channelCount, sound.sampleRateHz, sound.latency], [3, 48000, 0]);
+  const bar = sound.add(model);
+  const blow = { objects: bar, points: [POINT], impulses: [IMPULSE], durations: 1e-4, environments: [1] };
+  const episodes = [];
+  for (let episode = 0; episode < 2; episode += 1) {
+    const silence = await sound.step({ impacts: blow });
+    assert.equal(silence.frameCount, 960);
+    assert.equal(silence.samples.length, 2 * 3 * 960);
+    assert.ok(silence.samples.every((sample) => sample === 0));
+    assert.deepEqual([silence.impacts.environment, silence.impacts.object], [[1], [bar]]);
+    const { samples } = await sound.step();
+    assert.ok(samples.subarray(0, 3 * 960).every((sample) => sample === 0));
+    assert.ok(samples.subarray(3 * 960).some((sample) => Math.abs(sample) > 1e-3));
+    episodes.push(samples);
+    sound.reset();
+  }
+  assert.deepEqual(episodes[0], episodes[1]);
+  await assert.rejects(sound.step({ impacts: { ...blow, objects: 9 } }), { reason: 'OBJECT_NOT_FOUND' });
+  await assert.rejects(sound.step({ impacts: { ...blow, environments: [2] } }), { reason: 'UNKNOWN_ENVIRONMENT' });
+  await assert.rejects(c.perform({ step: 0.02, latency: 1 }), { reason: 'INVALID_SETTINGS' });
+  sound.close();
+});
+
 test('a trace is written and read, and a damaged one is refused', async () => {
   const trace = new carillon.Trace({ step: 1 / 60, simulator: 'test' });
   trace.add(model);

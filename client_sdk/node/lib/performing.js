@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const util = require('util');
+const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
+const { contactColumns, given, poseColumns, present, toHandle, toPose } = require('./contacts');
+const { fromCall, fromInfo } = require('./errors');
+const { named, toRadiation } = require('./materials');
+const { samplesOf } = require('./sound');
+const { streamSettings } = require('./traces');
+
+const KINDS = ['omni', 'stereo', 'ears', 'ambisonic'];
+
+/** The indices of environments for a message, where none means all. */
+function indices(environments) {
+  if (environments === undefined || environments === null) return [];
+  const list = typeof environments === 'number' ? [environments] : Array.from(environments);
+  if (!list.length) throw new RangeError('environments is empty; leave it out to mean all of them');
+  return list;
+}
+
+function toMicrophone(microphone) {
+  refuseUnknown(microphone, ['kind', 'order', 'pose', 'on'], 'a microphone');
+  const { kind = 'omni', order, pose, on } = microphone;
+  if (!KINDS.includes(kind)) refuse(kind, 'kind of a microphone', KINDS.map((name) => `'${name}'`).join(', '));
+  return { kind: `MICROPHONE_KIND_${kind.toUpperCase()}`, ...present({ ambisonic_order: order, object: toHandle(on) }),
+    ...given('pose', toPose(pose)) };
+}
+
+/** Columns with the environment of each row; `read` makes the other columns. */
+function withEnvironments({ environments, ...columns }, read) {
+  return { columns: read(columns), ...environments === undefined ? {} : { environment: Array.from(environments) } };
+}
+
+/**
+ * Environments whose sound comes in step with their simulation. Client.perform begins them. `channelCount` is that of
+ * all microphones together, and `latency` is the constant time from a contact to its sound, in seconds.
+ */
+class Performance {
+  constructor(client, own) {
+    refuseUnknown(own, ['step', 'environments', 'microphones', 'latency', 'frame', 'pulseShape', 'sampleRateHz',
+      'fullScalePa', 'hearing', 'tellImpacts'], 'perform');
+    const { step, environments = 1, microphones = [], latency, sampleRateHz, fullScalePa, hearing, tellImpacts } = own;
+    refuseNoNumbers({ step, environments, latency, sampleRateHz, fullScalePa }, 'perform');
+    if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
+    this.settings = { ...present({ step_s: step, environment_count: environments, latency_s: latency,
+      sample_rate_hz: sampleRateHz, full_scale_pa: fullScalePa, tell_impacts: tellImpacts }),
+    microphones: microphones.map(toMicrophone), ...given('hearing', hearing),
+    ...streamSettings({ frame: own.frame, pulseShape: own.pulseShape }) };
+    this.client = client;
+    this.environmentCount = environments;
+    this.next = {}; // what the next step brings beside its contacts
+    this.handle = 0;
+    this.rejectedCount = 0;
+  }
+
+  async begin() {
+    this.call = this.client.stub('AudioService').Perform();
+    this.client.openCalls.add(this.call);
+    this.answers = this.call[Symbol.asyncIterator]();
+    const { begun } = await this.ask({ settings: this.settings });
+    this.sampleRateHz = begun.sample_rate_hz;
+    this.channelCount = begun.channel_count;
+    this.latency = begun.latency_frames / begun.sample_rate_hz;
+    return this;
+  }
+
+  /** Sends a request, and returns the first message of its answer. */
+  ask(request) {
+    this.call.write(request);
+    return this.receive();
+  }
+
+  async receive() {
+    try {
+      const { value, done } = await this.answers.next();
+      if (done) throw new Error('the performance has ended');
+      return value;
+    } catch (error) {
+      throw fromCall(error, this.client.server);
+    }
+  }
+
+  /**
+   * Adds an object to the `environments`, by default to all, before the contacts of the next step. Returns its handle,
+   * which is the same in each of them.
+   */
+  add(model, settings = {}) {
+    refuseUnknown(settings, ['environments', 'material', 'size', 'gain', 'pose', 'handle', 'radiation'], 'add');
+    const { environments, material, size = 1, gain = 1, pose, handle, radiation } = settings;
+    refuseNoNumbers({ size, gain }, 'add');
+    this.handle = toHandle(handle) || this.handle + 1;
+    this.next.added_objects = [...this.next.added_objects ?? [], {
+      object: { handle: this.handle, ...named(model, material), size, gain, ...given('pose', toPose(pose)),
+        ...present({ radiation: toRadiation(radiation) }) },
+      environments: indices(environments) }];
+    return this.handle;
+  }
+
+  /** Removes an object from the environments, by default from all, at the next step. Its sound fades out within 10 ms. */
+  remove(object, environments) {
+    this.next.removed_objects = [...this.next.removed_objects ?? [],
+      { object: toHandle(object), environments: indices(environments) }];
+  }
+
+  /**
+   * Ends the sound of environments, by default of all, at once, and lets them begin anew: their time is zero, and their
+   * objects and microphones are where they were added.
+   */
+  reset(environments) {
+    this.call.write({ reset: { environments: indices(environments) } });
+  }
+
+  /**
+   * Performs a step of all environments, with contacts, impacts, forces and poses as columns at its end; their
+   * `environments` have the index of each row, by default 0. Returns the samples of the step, a Float32Array with
+   * element [environment][channel][frame], `frameCount`, and the impacts if the performance tells them, as the columns
+   * of PerformedImpacts. Throws CarillonError if a contact is rejected; the step was performed without it.
+   */
+  async step(content = {}) {
+    refuseUnknown(content, ['contacts', 'impacts', 'forces', 'poses'], 'step');
+    const step = this.next;
+    this.next = {};
+    for (const name of ['contacts', 'impacts', 'forces']) {
+      if (!content[name]) continue;
+      step.contacts = [...step.contacts ?? [],
+        withEnvironments(content[name], (columns) => contactColumns(columns, name))];
+    }
+    if (content.poses) step.poses = withEnvironments(content.poses, poseColumns);
+    let { samples: answer } = await this.ask({ step });
+    const pieces = [answer.samples];
+    while (!answer.is_last) {
+      ({ samples: answer } = await this.receive());
+      pieces.push(answer.samples);
+    }
+    if (answer.rejected_count > this.rejectedCount) {
+      this.rejectedCount = answer.rejected_count;
+      throw fromInfo(answer.last_rejection);
+    }
+    return { samples: samplesOf(pieces), frameCount: answer.frame_count, impacts: answer.impacts };
+  }
+
+  /** Ends the performance. */
+  close() {
+    this.client.openCalls.delete(this.call);
+    this.call.on('error', () => {}); // that it was cancelled
+    this.call.cancel();
+  }
+
+  [util.inspect.custom]() {
+    return `<Performance of ${counted(this.environmentCount, 'environment')}>`;
+  }
+}
+
+module.exports = { Performance };
