@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/bench.sh decomposition|mixer|database|engines|ingest|radiation [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
+# deploy/bench.sh decomposition|mixer|database|engines|ingest|motion|radiation
+# [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
 #
 # Installs what is missing, the programs compared with too, builds, runs all of them in turn on the
 # same input, and prints one table.

@@ -19,6 +19,7 @@
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/doctor_command.h"
 #include "client_sdk/cli/commands/program.h"
+#include "client_sdk/cli/options/foley_options.h"
 #include "client_sdk/cli/options/list_options.h"
 #include "client_sdk/cli/options/material_options.h"
 #include "client_sdk/cli/options/model_options.h"
@@ -276,6 +277,7 @@ void AddCommands(CLI::App& app, Program& program) {
   AddStrike(app, program);
   AddListen(app, program);
   AddRender(app, program);
+  AddFoley(app, program);
   AddVolume(app, program);
   AddStop(app, program);
   AddExample(app, program);

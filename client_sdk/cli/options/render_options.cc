@@ -16,20 +16,6 @@
 #include "client_sdk/cli/options/value_options.h"
 
 namespace carillon::cli {
-namespace {
-
-/// Traces that a daemon renders at a time.
-constexpr size_t kMostWorkers = 8;
-
-std::optional<Shard> ParseShard(const std::string& text) {
-  const size_t slash = text.find('/');
-  uint32_t number = 0, count = 0;
-  if (slash == std::string::npos || !absl::SimpleAtoi(text.substr(0, slash), &number) ||
-      !absl::SimpleAtoi(text.substr(slash + 1), &count) || number < 1 || number > count) {
-    return std::nullopt;
-  }
-  return Shard{.number = number, .count = count};
-}
 
 void AddSound(CLI::App& render, RenderOptions& options) {
   ReadGain(*render.add_option(
@@ -66,6 +52,21 @@ void AddSound(CLI::App& render, RenderOptions& options) {
       "--tail", options.tail_s,
       "The time to render after the last contact, s; 0 renders until the sound has died "
       "away [0]");
+}
+
+namespace {
+
+/// Traces that a daemon renders at a time.
+constexpr size_t kMostWorkers = 8;
+
+std::optional<Shard> ParseShard(const std::string& text) {
+  const size_t slash = text.find('/');
+  uint32_t number = 0, count = 0;
+  if (slash == std::string::npos || !absl::SimpleAtoi(text.substr(0, slash), &number) ||
+      !absl::SimpleAtoi(text.substr(slash + 1), &count) || number < 1 || number > count) {
+    return std::nullopt;
+  }
+  return Shard{.number = number, .count = count};
 }
 
 void AddFolder(CLI::App& render, RenderOptions& options) {

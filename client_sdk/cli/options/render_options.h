@@ -9,6 +9,11 @@ class App;
 
 namespace carillon::cli {
 
+struct RenderOptions;
+
+/// Adds the options of a sound file.
+void AddSound(CLI::App& render, RenderOptions& options);
+
 /// Adds `carillon render`.
 void AddRender(CLI::App& app, Program& program);
 

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/commands/foley_command.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <system_error>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_replace.h"
+#include "client_sdk/cli/commands/foley_bodies.h"
+#include "client_sdk/cli/output/job_progress.h"
+#include "client_sdk/cli/output/output.h"
+#include "client_sdk/motion/contact_steps.h"
+#include "client_sdk/motion/find_contacts.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using motion::MovingBody;
+
+/// Shares of unexplained momentum from which the masses or shapes are doubtful, and from which the
+/// contacts are wrong (docs/motion.md).
+constexpr double kDoubtful = 0.001, kWrong = 0.03;
+/// From this share on solutions that differ in their impulses explain the motion alike.
+constexpr double kAmbiguous = 0.2;
+
+void List(const FoleyScene& foley) {
+  const motion::Motion& motion = foley.scene.motion;
+  absl::PrintF("%d frames of %.6g s, from %.6g s on\n", motion.frame_count(), motion.frame_s,
+               motion.first_time_s);
+  for (size_t i = 0; i < motion.bodies.size(); ++i) {
+    const MovingBody& body = motion.bodies[i];
+    const FoleyBody& sounds = foley.bodies[i];
+    const char* moves = body.poses.size() == 1 ? "fixed" : body.mass_kg > 0 ? "free" : "driven";
+    absl::PrintF("%-20s  %-6s  %-16s  %10.4g kg  %6d triangles, %s%s\n", EscapedText(body.name),
+                 moves, sounds.material.empty() ? "silent" : sounds.material, body.mass_kg,
+                 body.surface.triangles.size(), sounds.closed ? "closed" : "open",
+                 foley.scene.bodies[i].material.empty()
+                     ? ""
+                     : absl::StrCat(", of \"", EscapedText(foley.scene.bodies[i].material), "\""));
+  }
+  for (const motion::SceneListener& listener : foley.scene.listeners) {
+    absl::PrintF("%-20s  camera\n", EscapedText(listener.name));
+  }
+}
+
+absl::Status CheckSounds(const FoleyScene& foley, bool force) {
+  bool sounds = false;
+  for (size_t i = 0; i < foley.bodies.size(); ++i) {
+    if (foley.bodies[i].material.empty()) continue;
+    sounds = true;
+    if (foley.bodies[i].closed || force) continue;
+    return Refusal(absl::StatusCode::kInvalidArgument, "SURFACE_OPEN",
+                   absl::StrCat(foley.scene.motion.bodies[i].name,
+                                " is not closed: close its surface, or repair it by --force, or "
+                                "keep it silent by --material '",
+                                foley.scene.motion.bodies[i].name, "=none'"));
+  }
+  if (sounds) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
+                 "no body has a material: name one, such as --material '*=oak', or see --list");
+}
+
+/// Refuses contacts that do not explain the motion, and warns of doubtful ones.
+absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& found, bool force) {
+  const motion::Confidence& is = found.confidence;
+  const std::string& worst = motion.bodies[is.worst_body].name;
+  const double time_s = motion.first_time_s + static_cast<double>(is.worst_frame) * motion.frame_s;
+  absl::FPrintF(stderr, "%d impacts, %d contact forces; unexplained %.3g %%, ambiguous %.2g %%\n",
+                found.blows.size(), found.loads.size(), 100 * is.unexplained, 100 * is.ambiguity);
+  const std::string where = absl::StrCat(worst, " near ", absl::SixDigits(time_s), " s");
+  if (is.ambiguity > kAmbiguous) {
+    absl::FPrintF(stderr,
+                  "warning: other impulses explain the motion as well: %.0f %% of the impulse is "
+                  "open, since several bodies touch within a frame; more frames a second tell\n",
+                  100 * is.ambiguity);
+  }
+  if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
+    absl::FPrintF(stderr,
+                  "warning: %.2g %% of the momentum is unexplained, most of it of %s: masses or "
+                  "shapes differ from those of the simulation\n",
+                  100 * is.unexplained, EscapedText(where));
+  }
+  if (is.unexplained <= kWrong || force) return absl::OkStatus();
+  if (is.nearest_gap_m > 0.05 * is.worst_radius_m) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MOTION_WITHOUT_CONTACT",
+        absl::StrCat("the momentum of ", where, " changes, and the nearest surface is ",
+                     absl::SixDigits(is.nearest_gap_m),
+                     " m away: is a floor missing (--floor), the unit (--unit) or --gravity wrong, "
+                     "or is the body moved by hand (--driven)? --force renders all the same"));
+  }
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "MOTION_UNEXPLAINED",
+      absl::StrCat("contacts explain all but ", absl::SixDigits(100 * is.unexplained),
+                   " % of the momentum, and 3 % is the most; the worst is ", where,
+                   ": check --gravity, --mass and --unit, export more frames a second, or name "
+                   "bodies that are moved by hand (--driven); --force renders all the same"));
+}
+
+/// Makes the models of the bodies that sound; bodies of one surface and material share one.
+class FoleyModels {
+ public:
+  FoleyModels(const client::Client& daemon, bool repair) : daemon_(daemon), repair_(repair) {}
+
+  absl::Status Request(const MovingBody& body, const FoleyBody& sounds) {
+    const std::string obj = motion::ObjText(body.surface);
+    const std::string key = absl::StrCat(sounds.material, " ", sounds.wall_m, "\n", obj);
+    const auto [at, is_new] = jobs_.try_emplace(key);
+    keys_[&body] = key;
+    if (!is_new) return absl::OkStatus();
+    ASSIGN_OR_RETURN(std::string digest, daemon_.UploadMesh(obj));
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(std::move(digest));
+    request.set_mesh_format("obj");
+    request.mutable_material()->set_preset(sounds.material);
+    request.mutable_settings()->mutable_mesh()->set_wall_m(sounds.wall_m);
+    request.mutable_settings()->mutable_mesh()->set_repair(repair_ && !sounds.closed);
+    request.set_size(1);
+    request.set_min_frequency_hz(20);
+    request.set_label(body.name);
+    ASSIGN_OR_RETURN(at->second, daemon_.CreateModalModel(request));
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<std::string> Await(const MovingBody& body) {
+    v1::Job& job = jobs_[keys_[&body]];
+    if (job.state() != v1::JOB_STATE_SUCCEEDED) {
+      ASSIGN_OR_RETURN(job, WatchWithProgress(daemon_, job.name()));
+    }
+    return job.modal_model();
+  }
+
+ private:
+  const client::Client& daemon_;
+  bool repair_;
+  std::map<const MovingBody*, std::string> keys_;
+  std::map<std::string, v1::Job> jobs_;
+};
+
+void Set(v1::Pose& to, const motion::BodyPose& from) {
+  to.mutable_position_m()->set_x(from.position_m.x());
+  to.mutable_position_m()->set_y(from.position_m.y());
+  to.mutable_position_m()->set_z(from.position_m.z());
+  to.mutable_orientation()->set_w(from.orientation.w());
+  to.mutable_orientation()->set_x(from.orientation.x());
+  to.mutable_orientation()->set_y(from.orientation.y());
+  to.mutable_orientation()->set_z(from.orientation.z());
+}
+
+/// Everything that is written into a trace.
+struct FoleyTrace {
+  v1::ContactTraceHeader header;
+  std::vector<v1::ContactTraceObject> objects;
+  std::vector<v1::ContactStep> steps;
+
+  /// Writes the trace; with `heard` above zero only that object is heard.
+  absl::Status Write(const std::string& path, uint32_t heard = 0) const {
+    ASSIGN_OR_RETURN(auto writer, client::ContactTraceWriter::Create(path, header));
+    for (v1::ContactTraceObject object : objects) {
+      if (heard > 0 && object.handle() != heard) object.set_gain(0);
+      writer.Write(object);
+    }
+    for (const v1::ContactStep& step : steps) RETURN_IF_ERROR(writer.Write(step));
+    return writer.Close();
+  }
+};
+
+absl::StatusOr<const motion::SceneListener*> FindListener(const FoleyOptions& options,
+                                                          const FoleyScene& foley) {
+  const auto& all = foley.scene.listeners;
+  if (options.listener.empty()) {
+    return options.sound.channel_count > 1 && !all.empty() ? &all.front() : nullptr;
+  }
+  const auto at = std::ranges::find(all, options.listener, &motion::SceneListener::name);
+  if (at != all.end()) return &*at;
+  return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
+                 absl::StrCat("no camera has the name ", options.listener, ": see --list"));
+}
+
+absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOptions& options,
+                                     const FoleyScene& foley, const motion::FoundContacts& found) {
+  const motion::Motion& motion = foley.scene.motion;
+  FoleyTrace trace;
+  trace.header.set_simulator("carillon foley");
+  trace.header.set_step_s(motion.frame_s);
+  ASSIGN_OR_RETURN(const motion::SceneListener* listener, FindListener(options, foley));
+  if (listener != nullptr) {
+    trace.header.mutable_hearing()->set_distance_gain(true);
+    trace.header.mutable_hearing()->set_panning(options.sound.channel_count > 1);
+    Set(*trace.header.mutable_listener(), listener->poses.front());
+  }
+  FoleyModels models(daemon, options.force);
+  motion::StepSettings settings{.handles = std::vector<uint32_t>(motion.bodies.size(), 0),
+                                .silent_striker = options.silent_striker,
+                                .roughness_depth = options.roughness_depth};
+  for (size_t i = 0; i < motion.bodies.size(); ++i) {
+    if (foley.bodies[i].material.empty()) continue;
+    RETURN_IF_ERROR(models.Request(motion.bodies[i], foley.bodies[i]));
+  }
+  for (size_t i = 0; i < motion.bodies.size(); ++i) {
+    if (foley.bodies[i].material.empty()) continue;
+    v1::ContactTraceObject& object = trace.objects.emplace_back();
+    settings.handles[i] = static_cast<uint32_t>(trace.objects.size());
+    object.set_handle(settings.handles[i]);
+    object.set_label(motion.bodies[i].name);
+    ASSIGN_OR_RETURN(*object.mutable_modal_model(), models.Await(motion.bodies[i]));
+    object.mutable_material()->set_preset(foley.bodies[i].material);
+    Set(*object.mutable_pose(), motion.bodies[i].poses.front());
+  }
+  trace.steps = motion::ToSteps(motion, found, settings);
+  if (listener != nullptr && listener->poses.size() > 1) {
+    for (size_t k = 0; k < trace.steps.size(); ++k) {
+      Set(*trace.steps[k].mutable_listener(), listener->poses[k]);
+    }
+  }
+  return trace;
+}
+
+absl::Status RenderStems(const client::Client& daemon, const FoleyOptions& options,
+                         const FoleyTrace& trace, const std::string& temporary) {
+  std::error_code error;
+  fs::create_directories(options.stems, error);
+  if (error) {
+    return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                   absl::StrCat(options.stems, ": ", error.message()));
+  }
+  for (const v1::ContactTraceObject& object : trace.objects) {
+    RETURN_IF_ERROR(trace.Write(temporary, object.handle()));
+    RenderOptions stem = options.sound;
+    stem.trace = temporary;
+    stem.normalize = false;  // stems add up to the sound
+    const std::string name = absl::StrReplaceAll(object.label(), {{"/", "_"}});
+    stem.out =
+        (fs::path(options.stems) / absl::StrCat(object.handle(), "-", name, ".wav")).string();
+    RETURN_IF_ERROR(Render(daemon, stem, false));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
+  ASSIGN_OR_RETURN(const FoleyScene foley, ReadFoleyScene(options));
+  if (options.list) {
+    List(foley);
+    return absl::OkStatus();
+  }
+  RETURN_IF_ERROR(CheckSounds(foley, options.force));
+  ASSIGN_OR_RETURN(const motion::FoundContacts found,
+                   motion::FindContacts(foley.scene.motion, options.force));
+  RETURN_IF_ERROR(Judge(foley.scene.motion, found, options.force));
+  const auto daemon = program.Daemon();
+  ASSIGN_OR_RETURN(const FoleyTrace trace, MakeTrace(*daemon, options, foley, found));
+  const std::string temporary =
+      (fs::temp_directory_path() / absl::StrCat("carillon-foley-", getpid(), ".contacts")).string();
+  const absl::Cleanup remove = [&temporary] {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+  };
+  const std::string path = options.trace.empty() ? temporary : options.trace;
+  RETURN_IF_ERROR(trace.Write(path));
+  if (options.sound.out.empty()) return absl::OkStatus();
+  RenderOptions sound = options.sound;
+  sound.trace = path;
+  RETURN_IF_ERROR(Render(*daemon, sound, program.json));
+  return options.stems.empty() ? absl::OkStatus() : RenderStems(*daemon, options, trace, temporary);
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "client_sdk/motion/motion.h"
+#include "client_sdk/motion/surface_index.h"
+
+namespace carillon::motion {
+
+/// A place at which two bodies may touch: a corner and a face, or two edges.
+struct ContactFeature {
+  uint64_t key = 0;                 ///< the same for the same corner or pair of edges
+  Vector point_a = Vector::Zero();  ///< in a's frame, on its surface
+  Vector point_b = Vector::Zero();  ///< in b's frame
+  Vector normal = Vector::Zero();   ///< from b to a, in the scene's axes
+  double gap_m = 0;
+};
+
+/// Two bodies at an instant, by the poses of their frames.
+struct PairPlacement {
+  BodyPose a, b;
+};
+
+/// Returns the places at which two bodies that lie so may touch: those with a gap within `reach_m`
+/// of zero, and at most `beyond_m` more than the least. Of many, the ones farthest apart.
+std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
+                                         const PairPlacement& at, double reach_m, double beyond_m);
+
+}  // namespace carillon::motion

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/motion/contact_reading.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace carillon::motion {
+namespace {
+
+/// A blow has more than this share of the impulse that the load around it gives in a frame,
+constexpr double kShareOfLoad = 0.6;
+/// and changes the relative velocity of the bodies by at least this, m/s.
+constexpr double kLeastSpeed = 0.02;
+
+/// An impulse at a point, at a time since the first frame.
+struct Piece {
+  const Candidate* candidate = nullptr;
+  double time_s = 0;
+  Vector impulse = Vector::Zero();
+};
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+
+/// The contacts of one pair while they are divided into blows and loads.
+class PairReading {
+ public:
+  PairReading(const Motion& motion, const SearchBodies& bodies, const BodyPair& pair, double bin_s)
+      : motion_(motion),
+        bin_s_(bin_s),
+        bodies_(bodies),
+        pair_(pair),
+        forces_(motion.frame_count(), 0.0) {}
+
+  void Add(const Candidate& candidate, double time_s, const Vector& value) {
+    if (candidate.blow()) {
+      pieces_.push_back({&candidate, time_s, value});
+      return;
+    }
+    for (size_t k = candidate.frame; k <= candidate.last_frame; ++k) {
+      loads_.push_back({k, {&candidate, 0, value}});
+      forces_[k] += value.norm();
+    }
+  }
+
+  void Read(FoundContacts& found) {
+    std::ranges::stable_sort(pieces_, {}, &Piece::time_s);
+    ReadBlows(found);
+    ReadLeaps(found);
+    for (const auto& [frame, piece] : loads_) AddLoad(frame, piece, found);
+  }
+
+ private:
+  /// The median of the load in the frames around, N.
+  double Around(size_t frame, size_t without) const {
+    std::vector<double> near;
+    const size_t last = forces_.size() - 1;
+    for (size_t k = frame > 3 ? frame - 3 : 0; k <= std::min(frame + 3, last); ++k) {
+      if (k + without > frame && k < frame + without) continue;
+      near.push_back(forces_[k]);
+    }
+    return Median(near);
+  }
+  double Least(size_t frame, size_t without) const {
+    return kShareOfLoad * motion_.frame_s * Around(frame, without) +
+           kLeastSpeed * pair_.reduced_mass_kg;
+  }
+
+  /// Takes pieces of one frame's time together, and keeps as loads those that are small.
+  void ReadBlows(FoundContacts& found) {
+    for (size_t first = 0; first < pieces_.size();) {
+      size_t end = first;
+      double sum = 0;
+      while (end < pieces_.size() &&
+             pieces_[end].time_s - pieces_[first].time_s < motion_.frame_s * 1.0001) {
+        sum += pieces_[end++].impulse.norm();
+      }
+      const std::vector<Piece> blow(pieces_.begin() + static_cast<std::ptrdiff_t>(first),
+                                    pieces_.begin() + static_cast<std::ptrdiff_t>(end));
+      if (sum > Least(blow.front().candidate->frame, 0)) {
+        AddBlow(blow, found);
+      } else {
+        for (const Piece& piece : blow) {
+          const auto frame = static_cast<size_t>(std::lround(piece.time_s / motion_.frame_s));
+          loads_.push_back({frame, {piece.candidate, 0, piece.impulse / motion_.frame_s}});
+        }
+      }
+      first = end;
+    }
+  }
+
+  /// Moves what is above the usual load, in one frame or two, into a blow.
+  void ReadLeaps(FoundContacts& found) {
+    const std::vector<double> forces = forces_;
+    std::vector<double> kept(forces.size(), 1);
+    for (size_t k = 1; k + 1 < forces.size(); ++k) {
+      const double usual = Around(k, 2), excess = (forces[k] - usual) * motion_.frame_s;
+      if (forces[k] == 0 || excess < Least(k, 2)) continue;
+      kept[k] = usual / forces[k];
+    }
+    for (size_t k = 1; k + 1 < forces.size(); ++k) {
+      if (kept[k] == 1) continue;
+      size_t end = k;
+      while (end < kept.size() && kept[end] < 1) ++end;
+      std::vector<Piece> blow;
+      for (auto& [frame, piece] : loads_) {
+        if (frame < k || frame >= end || end > k + 2) continue;
+        blow.push_back({piece.candidate, static_cast<double>(frame) * motion_.frame_s,
+                        piece.impulse * (1 - kept[frame]) * motion_.frame_s});
+        piece.impulse *= kept[frame];
+      }
+      if (!blow.empty()) AddBlow(blow, found);
+      k = end;
+    }
+  }
+
+  /// Adds a blow for each place: pieces at neighbouring places are one.
+  void AddBlow(const std::vector<Piece>& pieces, FoundContacts& found) {
+    std::vector<std::vector<Piece>> places;
+    for (const Piece& piece : pieces) {
+      const auto near = [&](const std::vector<Piece>& place) {
+        const ContactFeature& f = place.front().candidate->feature;
+        return f.key == piece.candidate->feature.key ||
+               (f.point_a - piece.candidate->feature.point_a).norm() < 3 * pair_.tolerance_m;
+      };
+      const auto place = std::ranges::find_if(places, near);
+      if (place == places.end())
+        places.push_back({piece});
+      else
+        place->push_back(piece);
+    }
+    // Places that cannot be told apart in time have one time.
+    const auto [first, last] = std::ranges::minmax(pieces, {}, &Piece::time_s);
+    const bool at_once = last.time_s - first.time_s < 2.5 * bin_s_;
+    for (const std::vector<Piece>& place : places) {
+      AddPlace(place, at_once ? MeanTime(pieces) : MeanTime(place), found);
+    }
+  }
+
+  /// The time of pieces, weighted by their impulses, s.
+  static double MeanTime(const std::vector<Piece>& pieces) {
+    double sum = 0, moment = 0;
+    for (const Piece& piece : pieces) {
+      sum += piece.impulse.norm();
+      moment += piece.impulse.norm() * piece.time_s;
+    }
+    return sum > 0 ? moment / sum : pieces.front().time_s;
+  }
+
+  void AddPlace(const std::vector<Piece>& pieces, double time_s, FoundContacts& found) {
+    FoundBlow blow;
+    blow.a = pair_.a;
+    blow.b = pair_.b;
+    double sum = 0;
+    for (const Piece& piece : pieces) {
+      const double size = piece.impulse.norm();
+      sum += size;
+      blow.impulse_newton_seconds += piece.impulse;
+      blow.point_a_m += size * piece.candidate->feature.point_a;
+      blow.point_b_m += size * piece.candidate->feature.point_b;
+    }
+    if (sum == 0) return;
+    blow.point_a_m /= sum;
+    blow.point_b_m /= sum;
+    const double frames = time_s / motion_.frame_s;
+    blow.frame = std::min(static_cast<size_t>(frames + 1e-9), forces_.size() - 2);
+    blow.time_s = std::max(0.0, frames - static_cast<double>(blow.frame)) * motion_.frame_s;
+    blow.orientation_a =
+        bodies_.motions[pair_.a].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+    blow.orientation_b =
+        bodies_.motions[pair_.b].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+    found.blows.push_back(blow);
+  }
+
+  void AddLoad(size_t frame, const Piece& piece, FoundContacts& found) const {
+    if (piece.impulse.isZero(0)) return;
+    FoundLoad load;
+    load.a = pair_.a;
+    load.b = pair_.b;
+    load.frame = frame;
+    load.point_a_m = piece.candidate->feature.point_a;
+    load.point_b_m = piece.candidate->feature.point_b;
+    load.force_newtons = piece.impulse;
+    const Vector slip = bodies_.motions[pair_.a].VelocityAt(frame, piece.candidate->arm_a) -
+                        bodies_.motions[pair_.b].VelocityAt(frame, piece.candidate->arm_b);
+    const Vector& normal = piece.candidate->feature.normal;
+    load.slip_m_per_s = (slip - slip.dot(normal) * normal).norm();
+    found.loads.push_back(load);
+  }
+
+  const Motion& motion_;
+  double bin_s_;
+  const SearchBodies& bodies_;
+  const BodyPair& pair_;
+  std::vector<Piece> pieces_;
+  std::vector<std::pair<size_t, Piece>> loads_;  ///< with forces instead of impulses
+  std::vector<double> forces_;                   ///< the sum of the loads at each frame
+};
+
+Confidence ReadConfidence(const SearchBodies& bodies, const ContactProblem& problem,
+                          size_t frames) {
+  Confidence confidence;
+  double given = 0, residual = 0, worst = 0;
+  for (size_t body = 0; body < bodies.motions.size(); ++body) {
+    double own_given = 0, own_residual = 0;
+    for (size_t k = 1; k + 1 < frames; ++k) {
+      own_given += problem.balance().Given(body, k);
+      const double here = problem.balance().Residual(body, k);
+      own_residual += here;
+      if (here <= worst) continue;
+      worst = here;
+      confidence.worst_body = body;
+      confidence.worst_frame = k;
+    }
+    given += own_given;
+    residual += own_residual;
+    confidence.unexplained_of_body.push_back(own_given > 0 ? own_residual / own_given : 0);
+  }
+  confidence.unexplained = given > 0 ? residual / given : 0;
+  return confidence;
+}
+
+}  // namespace
+
+FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
+                           const ContactSearch& search, const ContactProblem& problem) {
+  FoundContacts found;
+  std::vector<PairReading> readings;
+  const double bin_s = motion.frame_s / search.bin_count();
+  for (const BodyPair& pair : search.pairs()) readings.emplace_back(motion, bodies, pair, bin_s);
+  for (size_t i = 0; i < problem.candidates().size(); ++i) {
+    const Candidate& candidate = problem.candidates()[i];
+    if (problem.value(i).isZero(0)) continue;
+    readings[candidate.pair].Add(candidate, problem.TimeOf(candidate), problem.value(i));
+  }
+  for (PairReading& reading : readings) reading.Read(found);
+  const auto time = [&](const FoundBlow& blow) {
+    return static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
+  };
+  std::ranges::stable_sort(found.blows, {}, time);
+  std::ranges::stable_sort(found.loads, {}, &FoundLoad::frame);
+  found.confidence = ReadConfidence(bodies, problem, motion.frame_count());
+  return found;
+}
+
+void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double frame_s) {
+  const auto around = [frame_s](const FoundContacts& of, const FoundBlow& blow) {
+    Vector sum = Vector::Zero();
+    const double time = static_cast<double>(blow.frame) * frame_s + blow.time_s;
+    for (const FoundBlow& other : of.blows) {
+      const double when = static_cast<double>(other.frame) * frame_s + other.time_s;
+      if (other.a == blow.a && other.b == blow.b && std::abs(when - time) < frame_s) {
+        sum += other.impulse_newton_seconds;
+      }
+    }
+    return sum;
+  };
+  double total = 0, differing = 0;
+  for (FoundBlow& blow : found.blows) {
+    const Vector own = around(found, blow);
+    for (const FoundContacts& other : others) {
+      const double differs = (around(other, blow) - own).norm() / std::max(own.norm(), 1e-12);
+      blow.ambiguity = std::max(blow.ambiguity, std::min(1.0, differs));
+    }
+    total += blow.impulse_newton_seconds.norm();
+    differing += blow.ambiguity * blow.impulse_newton_seconds.norm();
+  }
+  for (const FoundContacts& other : others) {
+    for (const FoundBlow& blow : other.blows) {
+      if (around(found, blow).isZero(0)) {
+        differing += blow.impulse_newton_seconds.norm() / static_cast<double>(others.size());
+      }
+    }
+  }
+  found.confidence.ambiguity = total > 0 ? std::min(1.0, differing / total) : 0;
+}
+
+}  // namespace carillon::motion

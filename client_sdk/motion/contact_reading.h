@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "client_sdk/motion/contact_problem.h"
+
+namespace carillon::motion {
+
+/// Reads blows and loads off a solved problem: a blow is an impulse far above the load around it,
+/// and so is a load that leaps for a frame or two. The rest is load.
+FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
+                           const ContactSearch& search, const ContactProblem& problem);
+
+/// Sets how much the blows differ from those of other solutions.
+void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double within_s);
+
+}  // namespace carillon::motion

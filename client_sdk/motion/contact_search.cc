@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/motion/contact_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace carillon::motion {
+namespace {
+
+/// Below this speed, m/s, of all its points a body is still.
+constexpr double kStillSpeed = 0.002;
+/// The time between two blows that are told apart, s, as far as the frames allow.
+constexpr double kBinS = 0.004;
+
+double TolerancesOf(double a, double b) { return 0.01 * std::min(a, b); }
+
+}  // namespace
+
+ContactSearch::ContactSearch(const Motion& motion, const SearchBodies& bodies)
+    : motion_(motion),
+      bodies_(bodies),
+      frames_(motion.frame_count()),
+      bin_count_(
+          motion.frame_s < 0.6 * kBinS
+              ? 1
+              : static_cast<int>(std::clamp(std::round(motion.frame_s / kBinS), 2.0, 10.0))) {
+  const size_t count = bodies.motions.size();
+  still_.assign(count, std::vector<bool>(frames_, true));
+  acts_.assign(count, std::vector<bool>(frames_, false));
+  skipped_.assign(count, std::vector<bool>(frames_, false));
+  for (size_t body = 0; body < count; ++body) {
+    for (size_t frame = 0; frame < frames_; ++frame) {
+      still_[body][frame] = Still(body, frame);
+      acts_[body][frame] = Acts(body, frame);
+    }
+  }
+  FindPairs();
+}
+
+bool ContactSearch::Still(size_t body, size_t frame) const {
+  const BodyMotion& motion = bodies_.motions[body];
+  return motion.Speed(frame > 0 ? frame - 1 : 0) < kStillSpeed &&
+         motion.Speed(std::min(frame, frames_ - 2)) < kStillSpeed;
+}
+
+bool ContactSearch::Acts(size_t body, size_t node) const {
+  const BodyMotion& motion = bodies_.motions[body];
+  if (!motion.balanced()) return true;
+  if (node == 0 || node + 1 >= frames_) return false;
+  return motion.Jump(node) > bodies_.free_speed[body];
+}
+
+void ContactSearch::FindPairs() {
+  const size_t count = bodies_.motions.size();
+  for (uint32_t a = 0; a < count; ++a) {
+    for (uint32_t b = a + 1; b < count; ++b) {
+      const BodyMotion &one = bodies_.motions[a], &two = bodies_.motions[b];
+      if (!one.balanced() && !two.balanced()) continue;
+      const auto joins = [a, b](const Joint& joint) {
+        return (joint.body == a && joint.other == static_cast<int>(b)) ||
+               (joint.body == b && joint.other == static_cast<int>(a));
+      };
+      if (std::ranges::any_of(motion_.joints, joins)) continue;
+      BodyPair pair{.a = a, .b = b};
+      pair.tolerance_m = TolerancesOf(one.radius_m(), two.radius_m());
+      pair.reduced_mass_kg =
+          1 / ((one.balanced() ? 1 / one.mass_kg() : 0) + (two.balanced() ? 1 / two.mass_kg() : 0));
+      pair.friction = std::sqrt(motion_.bodies[a].friction * motion_.bodies[b].friction);
+      pairs_.push_back(pair);
+    }
+  }
+}
+
+bool ContactSearch::Near(const BodyPair& pair, size_t frame, double margin_m) const {
+  const BodyPose a = bodies_.motions[pair.a].AtFrame(frame);
+  const BodyPose b = bodies_.motions[pair.b].AtFrame(frame);
+  const auto apart = [&](const BodyPose& ball, const BodyPose& box, uint32_t of, uint32_t on) {
+    const Vector centre = bodies_.motions[on].centre_m() +
+                          box.orientation.conjugate() * (ball.position_m - box.position_m);
+    const double reach = bodies_.motions[of].radius_m() + margin_m;
+    return bodies_.surfaces[on]->box().squaredExteriorDistance(centre) > reach * reach;
+  };
+  return !apart(a, b, pair.a, pair.b) && !apart(b, a, pair.b, pair.a);
+}
+
+double ContactSearch::Slack(const BodyPair& pair, size_t interval) const {
+  double speed = 0;
+  const size_t last = frames_ - 2;
+  for (const size_t k :
+       {interval > 0 ? interval - 1 : 0, std::min(interval, last), std::min(interval + 1, last)}) {
+    speed = std::max(speed, bodies_.motions[pair.a].Speed(k) + bodies_.motions[pair.b].Speed(k));
+  }
+  return pair.tolerance_m + speed * motion_.frame_s / bin_count_;
+}
+
+PairPlacement ContactSearch::Place(const BodyPair& pair, size_t interval, double time_s,
+                                   Path path) const {
+  const auto place = [&](uint32_t body) {
+    const BodyMotion& motion = bodies_.motions[body];
+    BodyPose pose = path == Path::kBetween && time_s == 0 ? motion.AtFrame(interval)
+                                                          : motion.At(interval, time_s, path);
+    pose.position_m -= pose.orientation * motion.centre_m();
+    return pose;
+  };
+  return {place(pair.a), place(pair.b)};
+}
+
+void ContactSearch::FindAtFrames(size_t p, std::vector<PairFrame>& frames) const {
+  const BodyPair& pair = pairs_[p];
+  frames.resize(frames_);
+  for (size_t k = 1; k + 1 < frames_; ++k) {
+    PairFrame& frame = frames[k];
+    frame.slack_m = Slack(pair, k);
+    frame.still = still_[pair.a][k] && still_[pair.b][k];
+    if (frame.still && frames[k - 1].still) {
+      frame.features = frames[k - 1].features;
+      continue;
+    }
+    const double reach = frame.slack_m + 4 * pair.tolerance_m;
+    if (!Near(pair, k, reach)) continue;
+    frame.features = FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b],
+                                  Place(pair, k, 0, Path::kBetween), reach, 3 * pair.tolerance_m);
+  }
+}
+
+/// Engines keep bodies apart by a margin, or let them overlap. The gap at rest is the least known.
+void ContactSearch::FindOffset(BodyPair& pair, const std::vector<PairFrame>& frames) const {
+  std::vector<double> gaps;
+  for (const PairFrame& frame : frames) {
+    if (frame.features.empty()) continue;
+    const double gap = std::ranges::min_element(frame.features, {}, &ContactFeature::gap_m)->gap_m;
+    pair.nearest_m = std::min(pair.nearest_m, gap);
+    if (frame.slack_m < 3 * pair.tolerance_m && std::abs(gap) < 5 * pair.tolerance_m) {
+      gaps.push_back(gap);
+    }
+  }
+  if (gaps.size() < 3) return;
+  std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
+  pair.offset_m = gaps[gaps.size() / 2];
+}
+
+/// Leaves `still` true only where all bodies of a pile are still, and where the pile was the same
+/// in the frame before.
+void ContactSearch::MarkPiles(std::vector<std::vector<PairFrame>>& frames) {
+  const size_t count = bodies_.motions.size();
+  std::vector<size_t> before(count, 0), now(count, 0), root(count);
+  for (size_t k = 1; k + 1 < frames_; ++k) {
+    std::iota(root.begin(), root.end(), size_t{0});
+    const auto find = [&root](size_t i) {
+      while (root[i] != i) i = root[i] = root[root[i]];
+      return i;
+    };
+    for (size_t p = 0; p < pairs_.size(); ++p) {
+      const BodyPair& pair = pairs_[p];
+      if (frames[p][k].features.empty()) continue;
+      if (bodies_.motions[pair.a].balanced() && bodies_.motions[pair.b].balanced()) {
+        root[find(pair.a)] = find(pair.b);
+      }
+    }
+    std::vector<size_t> sum(count, 0);
+    std::vector<bool> moving(count, false);
+    for (size_t p = 0; p < pairs_.size(); ++p) {
+      if (frames[p][k].features.empty()) continue;
+      const size_t body = bodies_.motions[pairs_[p].a].balanced() ? pairs_[p].a : pairs_[p].b;
+      sum[find(body)] += (p + 1) * 0x9E3779B97F4A7C15U;
+      if (!frames[p][k].still) moving[find(body)] = true;
+    }
+    for (size_t body = 0; body < count; ++body) {
+      const size_t of = find(body);
+      now[body] = moving[of] || !still_[body][k] ? 0 : sum[of];
+    }
+    for (size_t p = 0; p < pairs_.size(); ++p) {
+      const size_t body = bodies_.motions[pairs_[p].a].balanced() ? pairs_[p].a : pairs_[p].b;
+      frames[p][k].still = now[body] != 0;
+    }
+    for (size_t body = 0; body < count; ++body) {
+      // A run of the same pile is looked at in its first two nodes and its last one.
+      skipped_[body][k] = now[body] != 0 && now[body] == before[body];
+    }
+    before = now;
+  }
+}
+
+void ContactSearch::Add(Candidate candidate, double time_s, Path path,
+                        std::vector<Candidate>& out) const {
+  const BodyPair& pair = pairs_[candidate.pair];
+  const auto arm = [&](uint32_t body, const Vector& point) {
+    const BodyMotion& motion = bodies_.motions[body];
+    const Turn turn = candidate.blow() ? motion.At(candidate.frame, time_s, path).orientation
+                                       : motion.AtFrame(candidate.frame).orientation;
+    return Vector(turn * (point - motion.centre_m()));
+  };
+  candidate.arm_a = arm(pair.a, candidate.feature.point_a);
+  candidate.arm_b = arm(pair.b, candidate.feature.point_b);
+  out.push_back(candidate);
+}
+
+void ContactSearch::AddLoads(size_t p, const std::vector<PairFrame>& frames,
+                             std::vector<Candidate>& out) {
+  const BodyPair& pair = pairs_[p];
+  const size_t body = bodies_.motions[pair.a].balanced() ? pair.a : pair.b;
+  for (size_t k = 1; k + 1 < frames_; ++k) {
+    if (!acts_[pair.a][k] || !acts_[pair.b][k]) continue;
+    size_t last = k;
+    while (frames[k].still && last + 2 < frames_ && frames[last + 1].still &&
+           skipped_[body][last + 1]) {
+      ++last;
+    }
+    for (const ContactFeature& feature : frames[k].features) {
+      Candidate candidate{.pair = static_cast<uint32_t>(p),
+                          .frame = static_cast<uint32_t>(k),
+                          .last_frame = static_cast<uint32_t>(last),
+                          .feature = feature,
+                          .slack_m = frames[k].slack_m};
+      candidate.feature.gap_m -= pair.offset_m;
+      if (std::abs(candidate.feature.gap_m) > frames[k].slack_m) continue;
+      Add(candidate, 0, Path::kBetween, out);
+    }
+    k = last;
+  }
+}
+
+void ContactSearch::AddBlows(size_t p, const std::vector<PairFrame>& frames, bool known,
+                             std::vector<Candidate>& out) const {
+  const BodyPair& pair = pairs_[p];
+  const double tolerance = pair.tolerance_m, bin_s = motion_.frame_s / bin_count_;
+  for (size_t k = 0; k + 1 < frames_; ++k) {
+    if (!(acts_[pair.a][k] || acts_[pair.a][k + 1]) || !(acts_[pair.b][k] || acts_[pair.b][k + 1]))
+      continue;
+    if (frames[k].still && frames[k + 1].still) continue;
+    const double slack = Slack(pair, k), reach = slack + 4 * tolerance;
+    if (!Near(pair, k, reach + slack * bin_count_)) continue;
+    for (int bin = 0; bin < bin_count_; ++bin) {
+      std::map<uint64_t, std::pair<Candidate, Path>> best;
+      for (const Path path : {Path::kBefore, Path::kBetween, Path::kAfter, Path::kKnown}) {
+        if (known != (path == Path::kKnown)) continue;
+        for (const ContactFeature& feature :
+             FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b],
+                          Place(pair, k, bin * bin_s, path), reach, 3 * tolerance)) {
+          Candidate candidate{.pair = static_cast<uint32_t>(p),
+                              .frame = static_cast<uint32_t>(k),
+                              .last_frame = static_cast<uint32_t>(k),
+                              .bin = bin,
+                              .feature = feature,
+                              .slack_m = slack};
+          candidate.feature.gap_m -= pair.offset_m;
+          const auto at = best.try_emplace(feature.key, candidate, path).first;
+          if (std::abs(candidate.feature.gap_m) < std::abs(at->second.first.feature.gap_m)) {
+            at->second = {candidate, path};
+          }
+        }
+      }
+      for (const auto& [key, found] : best) {
+        if (std::abs(found.first.feature.gap_m) > slack) continue;
+        Add(found.first, bin * bin_s, found.second, out);
+      }
+    }
+  }
+}
+
+std::vector<Candidate> ContactSearch::Find(bool known) {
+  std::vector<std::vector<PairFrame>> frames(pairs_.size());
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    FindAtFrames(p, frames[p]);
+    FindOffset(pairs_[p], frames[p]);
+  }
+  MarkPiles(frames);
+  std::vector<Candidate> candidates;
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    AddLoads(p, frames[p], candidates);
+    AddBlows(p, frames[p], known, candidates);
+  }
+  return candidates;
+}
+
+}  // namespace carillon::motion

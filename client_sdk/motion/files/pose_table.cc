@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "client_sdk/interchange/npy_array.h"
+#include "client_sdk/interchange/zip_archive.h"
+#include "client_sdk/motion/files/motion_scene.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::motion {
+namespace {
+
+absl::Status Malformed(const std::string& path, absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "MOTION_MALFORMED",
+                 absl::StrCat(path, ": ", what));
+}
+
+/// Sets the times of the frames, which must be equally far apart.
+absl::Status SetTimes(const std::string& path, const std::vector<double>& times, Motion& motion) {
+  if (times.size() < 2) return Malformed(path, "poses of one time alone are no motion");
+  motion.first_time_s = times.front();
+  motion.frame_s = (times.back() - times.front()) / static_cast<double>(times.size() - 1);
+  for (size_t k = 0; k < times.size(); ++k) {
+    const double expected = motion.first_time_s + static_cast<double>(k) * motion.frame_s;
+    if (motion.frame_s > 0 && std::abs(times[k] - expected) < 0.01 * motion.frame_s) continue;
+    return Malformed(path, absl::StrCat("frame ", k, " is at ", times[k], " s instead of ",
+                                        expected, " s: frames must be equally far apart in time"));
+  }
+  return absl::OkStatus();
+}
+
+BodyPose PoseOf(const double* x, const double* q) {
+  return {{x[0], x[1], x[2]}, Turn(q[0], q[1], q[2], q[3])};
+}
+
+absl::StatusOr<MotionScene> ReadCsv(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(path, " cannot be opened"));
+  }
+  MotionScene scene;
+  std::map<std::string, size_t> bodies;
+  std::vector<double> times;
+  std::string line;
+  for (size_t number = 1; std::getline(file, line); ++number) {
+    const std::vector<std::string> cells = absl::StrSplit(absl::StripAsciiWhitespace(line), ',');
+    double t = 0;
+    if (number == 1 && !absl::SimpleAtod(cells[0], &t)) continue;  // the line of names
+    if (cells.size() == 1 && cells[0].empty()) continue;
+    std::array<double, 7> x{};
+    bool good = cells.size() == 9 && absl::SimpleAtod(cells[0], &t);
+    for (size_t i = 0; i < 7 && good; ++i) good = absl::SimpleAtod(cells[i + 2], &x[i]);
+    if (!good) {
+      return Malformed(path, absl::StrCat("line ", number, " is not t,body,x,y,z,qw,qx,qy,qz"));
+    }
+    if (times.empty() || t > times.back()) times.push_back(t);
+    const std::string name(absl::StripAsciiWhitespace(cells[1]));
+    const auto [at, is_new] = bodies.try_emplace(name, scene.motion.bodies.size());
+    if (is_new) scene.motion.bodies.emplace_back().name = name;
+    scene.motion.bodies[at->second].poses.push_back(PoseOf(x.data(), x.data() + 3));
+  }
+  RETURN_IF_ERROR(SetTimes(path, times, scene.motion));
+  return scene;
+}
+
+absl::StatusOr<interchange::NpyArray> ArrayOf(const interchange::ZipReader& zip,
+                                              const std::string& path, const std::string& name) {
+  ASSIGN_OR_RETURN(const auto file, zip.Read(absl::StrCat(name, ".npy")));
+  if (!file) return Malformed(path, absl::StrCat("the array ", name, " is missing"));
+  return interchange::ParseNpy(name, *file);
+}
+
+absl::StatusOr<std::vector<std::string>> NamesOf(const interchange::NpyArray& array) {
+  std::vector<std::string> names;
+  const size_t count = array.shape.empty() ? 1 : array.shape[0];
+  const size_t size = count > 0 ? array.bytes.size() / count : 0;
+  for (size_t i = 0; i < count; ++i) {
+    ASSIGN_OR_RETURN(std::string name,
+                     interchange::ToText("bodies", {.type = array.type,
+                                                    .shape = {},
+                                                    .bytes = array.bytes.substr(i * size, size)}));
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+absl::StatusOr<MotionScene> ReadNpz(const std::string& path) {
+  ASSIGN_OR_RETURN(const interchange::ZipReader zip, interchange::ZipReader::Open(path));
+  std::vector<double> times, x, q;
+  ASSIGN_OR_RETURN(const interchange::NpyArray time_array, ArrayOf(zip, path, "times"));
+  RETURN_IF_ERROR(interchange::ToNumbers("times", time_array, times));
+  ASSIGN_OR_RETURN(const interchange::NpyArray places, ArrayOf(zip, path, "positions"));
+  RETURN_IF_ERROR(interchange::ToNumbers("positions", places, x));
+  ASSIGN_OR_RETURN(const interchange::NpyArray turns, ArrayOf(zip, path, "orientations"));
+  RETURN_IF_ERROR(interchange::ToNumbers("orientations", turns, q));
+  ASSIGN_OR_RETURN(const interchange::NpyArray name_array, ArrayOf(zip, path, "bodies"));
+  ASSIGN_OR_RETURN(const std::vector<std::string> names, NamesOf(name_array));
+  const size_t count = names.size();
+  if (x.size() != 3 * times.size() * count || q.size() != 4 * times.size() * count) {
+    return Malformed(path, absl::StrCat("positions must be (", times.size(), ", ", count,
+                                        ", 3) and orientations (", times.size(), ", ", count,
+                                        ", 4), as times and bodies are"));
+  }
+  MotionScene scene;
+  for (size_t body = 0; body < count; ++body) {
+    MovingBody& moving = scene.motion.bodies.emplace_back();
+    moving.name = names[body];
+    for (size_t k = 0; k < times.size(); ++k) {
+      moving.poses.push_back(PoseOf(&x[3 * (k * count + body)], &q[4 * (k * count + body)]));
+    }
+  }
+  RETURN_IF_ERROR(SetTimes(path, times, scene.motion));
+  return scene;
+}
+
+/// A body that never moves has one pose.
+void FixStill(MovingBody& body) {
+  const auto same = [&](const BodyPose& pose) {
+    return pose.position_m == body.poses[0].position_m &&
+           pose.orientation.coeffs() == body.poses[0].orientation.coeffs();
+  };
+  if (!body.poses.empty() && std::ranges::all_of(body.poses, same)) body.poses.resize(1);
+}
+
+}  // namespace
+
+absl::StatusOr<MotionScene> ReadPoseTable(const std::string& path) {
+  absl::StatusOr<MotionScene> scene =
+      absl::EndsWithIgnoreCase(path, ".npz") ? ReadNpz(path) : ReadCsv(path);
+  if (!scene.ok()) return scene;
+  scene->bodies.resize(scene->motion.bodies.size());
+  for (MovingBody& body : scene->motion.bodies) FixStill(body);
+  return scene;
+}
+
+}  // namespace carillon::motion

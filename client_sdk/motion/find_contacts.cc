@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/motion/find_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "client_sdk/motion/contact_problem.h"
+#include "client_sdk/motion/contact_reading.h"
+#include "client_sdk/motion/contact_search.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::motion {
+namespace {
+
+/// A larger turn between two frames cannot be told from one the other way around, rad.
+constexpr double kMostTurn = 2.5;
+constexpr int kPasses = 3;
+constexpr int kVariants = 2;
+
+absl::Status Refused(absl::string_view reason, absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, reason, what);
+}
+
+absl::Status CheckBody(const MovingBody& body, size_t frames) {
+  if (body.poses.size() != 1 && body.poses.size() != frames) {
+    return Refused("MOTION_MALFORMED",
+                   absl::StrCat(body.name, " has ", body.poses.size(), " poses, and another body ",
+                                frames, ": give one pose for each frame, or one alone"));
+  }
+  for (size_t k = 0; k < body.poses.size(); ++k) {
+    const BodyPose& pose = body.poses[k];
+    if (pose.position_m.allFinite() && std::abs(pose.orientation.norm() - 1) < 1e-3) continue;
+    return Refused("MOTION_MALFORMED",
+                   absl::StrCat("pose ", k, " of ", body.name,
+                                " has a number that is not finite, or a quaternion whose length is "
+                                "not 1: repair the file"));
+  }
+  if (body.mass_kg == 0 || body.poses.size() == 1) return absl::OkStatus();
+  const Eigen::SelfAdjointEigenSolver<Matrix> moments(body.inertia_kg_m2);
+  if (body.mass_kg > 0 && moments.eigenvalues().minCoeff() > 0) return absl::OkStatus();
+  return Refused("MOTION_MALFORMED", absl::StrCat(body.name,
+                                                  " has a mass or a moment of inertia that is not "
+                                                  "above zero: give both"));
+}
+
+absl::Status Check(const Motion& motion) {
+  const size_t frames = motion.frame_count();
+  if (frames < 4) {
+    return Refused("NO_MOTION", absl::StrCat("the motion has ", frames,
+                                             " frames, and impulses need four at least"));
+  }
+  if (!(motion.frame_s > 0) || !motion.gravity_m_per_s2.allFinite()) {
+    return Refused("MOTION_MALFORMED", "the time of a frame must be above zero, gravity finite");
+  }
+  for (const MovingBody& body : motion.bodies) RETURN_IF_ERROR(CheckBody(body, frames));
+  return absl::OkStatus();
+}
+
+absl::Status CheckTurns(const Motion& motion, const SearchBodies& bodies) {
+  for (size_t body = 0; body < bodies.motions.size(); ++body) {
+    if (!bodies.motions[body].balanced()) continue;
+    for (size_t k = 0; k + 1 < motion.frame_count(); ++k) {
+      if (bodies.motions[body].Angle(k) <= kMostTurn) continue;
+      return Refused(
+          "MOTION_TOO_COARSE",
+          absl::StrCat(motion.bodies[body].name, " turns by ", bodies.motions[body].Angle(k),
+                       " rad after ", motion.first_time_s + static_cast<double>(k) * motion.frame_s,
+                       " s, and more than 2.5 rad between two frames cannot be told "
+                       "apart: export more frames a second"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+/// The quietest fifth of the nodes of a body tells how noisy its poses are.
+double FreeSpeed(const BodyMotion& body, const Motion& motion) {
+  const double fall = motion.gravity_m_per_s2.norm() * motion.frame_s;
+  const double least = fall > 0 ? std::min(0.03, 0.3 * fall) : 0.03;
+  if (!body.balanced()) return least;
+  std::vector<double> jumps;
+  for (size_t k = 1; k + 1 < motion.frame_count(); ++k) jumps.push_back(body.Jump(k));
+  std::ranges::sort(jumps);
+  const double quiet = jumps[jumps.size() / 5];
+  return std::max(least, std::min(4 * quiet, 0.5 * fall));
+}
+
+std::optional<SearchBodies> Prepare(const Motion& motion) {
+  SearchBodies bodies;
+  bool moves = false;
+  for (const MovingBody& body : motion.bodies) {
+    bodies.surfaces.push_back(std::make_unique<SurfaceIndex>(body.surface));
+    bodies.motions.emplace_back(body, motion);
+    bodies.free_speed.push_back(FreeSpeed(bodies.motions.back(), motion));
+    moves = moves || bodies.motions.back().balanced();
+  }
+  if (!moves) return std::nullopt;
+  return bodies;
+}
+
+/// Says how far the body whose momentum is least explained was from any other.
+void SetNearest(const Motion& motion, const SearchBodies& bodies, Confidence& confidence) {
+  const size_t worst = confidence.worst_body, frame = confidence.worst_frame;
+  const auto pose = [&](size_t body) {
+    return motion.bodies[body].poses[motion.bodies[body].poses.size() > 1 ? frame : 0];
+  };
+  confidence.worst_radius_m = bodies.motions[worst].radius_m();
+  double nearest = 1e300;
+  for (size_t other = 0; other < motion.bodies.size(); ++other) {
+    if (other == worst) continue;
+    for (const Vector& vertex : motion.bodies[worst].surface.vertices_m) {
+      const Vector point =
+          pose(other).orientation.conjugate() *
+          (pose(worst).position_m + pose(worst).orientation * vertex - pose(other).position_m);
+      const double far = std::min(nearest, bodies.surfaces[other]->box().exteriorDistance(point) +
+                                               bodies.surfaces[other]->box().diagonal().norm());
+      if (const auto at = bodies.surfaces[other]->Nearest(point, far)) {
+        nearest = std::min(nearest, std::abs(at->gap_m));
+      }
+    }
+  }
+  confidence.nearest_gap_m = nearest;
+}
+
+}  // namespace
+
+absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_coarse) {
+  RETURN_IF_ERROR(Check(motion));
+  std::optional<SearchBodies> bodies = Prepare(motion);
+  if (!bodies) {
+    return Refused("NO_MOTION",
+                   "no body with a mass moves: name the bodies that fall, or give "
+                   "masses");
+  }
+  if (!even_if_coarse) RETURN_IF_ERROR(CheckTurns(motion, *bodies));
+  ContactSearch search(motion, *bodies);
+  std::unique_ptr<ContactProblem> problem;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    problem = std::make_unique<ContactProblem>(motion, *bodies, search, search.Find(pass > 0));
+    problem->Solve();
+    if (pass + 1 < kPasses) problem->Tell(bodies->motions);
+  }
+  FoundContacts found = ReadContacts(motion, *bodies, search, *problem);
+  std::vector<FoundContacts> others;
+  for (int variant = 1; variant <= kVariants; ++variant) {
+    ContactProblem varied(motion, *bodies, search, problem->candidates());
+    varied.Solve(variant);
+    others.push_back(ReadContacts(motion, *bodies, search, varied));
+  }
+  SetAmbiguity(found, others, motion.frame_s);
+  SetNearest(motion, *bodies, found.confidence);
+  return found;
+}
+
+}  // namespace carillon::motion

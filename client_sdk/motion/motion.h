@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace carillon::motion {
+
+using Vector = Eigen::Vector3d;
+using Matrix = Eigen::Matrix3d;
+using Turn = Eigen::Quaterniond;
+
+/// The place of a body's frame in the scene.
+struct BodyPose {
+  Vector position_m = Vector::Zero();
+  Turn orientation = Turn::Identity();
+};
+
+/// A closed surface in the frame of its body, metres, whose triangles turn their outsides by the
+/// right hand.
+struct BodySurface {
+  std::vector<Vector> vertices_m;
+  std::vector<std::array<uint32_t, 3>> triangles;
+};
+
+/// A body and its motion.
+struct MovingBody {
+  std::string name;
+  BodySurface surface;
+  /// Zero: nothing is known of what moves the body, or it is fixed. Its momentum is not balanced.
+  double mass_kg = 0;
+  Vector centre_of_mass_m = Vector::Zero();  ///< in the body's frame
+  Matrix inertia_kg_m2 = Matrix::Zero();     ///< about the centre of mass, in the body's axes
+  double friction = 0.6;                     ///< a pair has the geometric mean of both
+  std::vector<BodyPose> poses;               ///< one for each frame, or a single one: a fixed body
+};
+
+/// What a joint leaves free.
+enum class JointKind { kBall, kHinge, kFixed };
+
+/// A joint that holds two bodies together, or one body to the scene.
+struct Joint {
+  size_t body = 0;
+  int other = -1;                    ///< the second body; -1: the scene
+  Vector anchor_m = Vector::Zero();  ///< in the first body's frame
+  Vector axis = Vector::UnitZ();     ///< of a hinge, in the first body's frame
+  JointKind kind = JointKind::kBall;
+};
+
+/// Bodies whose poses are known at frames of equal distance in time.
+struct Motion {
+  double first_time_s = 0;
+  double frame_s = 1.0 / 60;
+  Vector gravity_m_per_s2{0, 0, -9.81};
+  std::vector<MovingBody> bodies;
+  std::vector<Joint> joints;
+
+  size_t frame_count() const {
+    size_t count = 0;
+    for (const MovingBody& body : bodies) count = std::max(count, body.poses.size());
+    return count;
+  }
+};
+
+/// A point of a contact between two bodies. Vectors act on body `a`, and their opposites on `b`.
+struct ContactPoint {
+  uint32_t a = 0, b = 0;
+  size_t frame = 0;                   ///< the frame at or before the contact
+  Vector point_a_m = Vector::Zero();  ///< in a's frame, on a's surface
+  Vector point_b_m = Vector::Zero();  ///< in b's frame, on b's surface
+};
+
+/// A blow.
+struct FoundBlow : ContactPoint {
+  double time_s = 0;                               ///< since frame `frame`
+  Vector impulse_newton_seconds = Vector::Zero();  ///< in the scene's axes
+  Turn orientation_a = Turn::Identity();           ///< of a at the time of the blow
+  Turn orientation_b = Turn::Identity();
+  /// Share of the impulse that other solutions, which explain the motion as well, do not have.
+  double ambiguity = 0;
+};
+
+/// The force of a contact that rests, slides or rolls, at the time of its frame. It is
+/// interpolated linearly from frame to frame.
+struct FoundLoad : ContactPoint {
+  Vector force_newtons = Vector::Zero();  ///< in the scene's axes
+  double slip_m_per_s = 0;                ///< speed at which the surfaces slide over each other
+};
+
+/// How well the contacts explain the motion.
+struct Confidence {
+  /// |A x - b|^2 / |b|^2 of momenta scaled to energy: 0 where the contacts found explain all.
+  double unexplained = 0;
+  std::vector<double> unexplained_of_body;
+  /// Share of the impulse of all blows that differs between solutions that explain the motion
+  /// equally well.
+  double ambiguity = 0;
+  size_t worst_body = 0;  ///< whose momentum is least explained
+  size_t worst_frame = 0;
+  double nearest_gap_m = 0;   ///< of any surface to the worst body at that frame
+  double worst_radius_m = 0;  ///< of the worst body
+};
+
+/// The contacts that explain a motion.
+struct FoundContacts {
+  std::vector<FoundBlow> blows;  ///< in order of time
+  std::vector<FoundLoad> loads;  ///< in order of frames
+  Confidence confidence;
+};
+
+}  // namespace carillon::motion

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Lets bodies fall in an engine at 2400 Hz, finds their contacts from the poses of frames alone,
+// and prints how these compare with the engine's: a line for each scene and frame rate.
+#include <cstdio>
+#include <ctime>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client_sdk/motion/find_contacts.h"
+#include "tests/client_sdk/motion/fall_truth.h"
+
+namespace carillon::motion {
+namespace {
+
+double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+Engine EngineOf(const std::string& name) {
+  if (name == "ode") return falls::FallInOde;
+#ifdef CARILLON_MUJOCO
+  if (name == "mujoco") {
+    return [](const falls::FallScene& scene, double step_s) {
+      return falls::FallInMujoco(scene, step_s).value();
+    };
+  }
+#endif
+  return falls::FallInBullet;
+}
+
+void PrintRow(const std::string& name, const falls::FallScene& scene, const Engine& engine,
+              int frames_per_second) {
+  const double step_s = name == "crowd" ? 1.0 / 240 : 1.0 / 2400;
+  const Fall fall =
+      Drop(scene, engine, static_cast<int>(1 / step_s + 0.5) / frames_per_second, step_s);
+  const double begin = CpuSeconds();
+  const auto found = FindContacts(fall.motion);
+  const double cpu_s = CpuSeconds() - begin;
+  std::printf("%s\t%d\t", name.c_str(), frames_per_second);
+  if (!found.ok()) {
+    std::printf("%s\n", std::string(found.status().message()).c_str());
+    return;
+  }
+  const Likeness is = Compare(fall, *found);
+  std::printf(
+      "%d/%d (%.1f %%)\t%d (%.1f %%)\t%.2f, %.2f\t%.1f %%, %.1f %%\t%.1f\t%.3f %%\t%.0f %%\t",
+      is.found_count, is.true_count, 100 * is.found_share, is.false_count, 100 * is.false_share,
+      1e3 * is.median_dt_s, 1e3 * is.dt90_s, 100 * is.median_size_error,
+      100 * is.median_vector_error, 1e3 * is.median_point_m, 100 * found->confidence.unexplained,
+      100 * found->confidence.ambiguity);
+  std::printf("%.2f\n", cpu_s);
+  std::fflush(stdout);
+}
+
+/// Fifty boxes that fall from different heights, for 20 s.
+falls::FallScene CrowdScene() {
+  falls::FallScene scene = CornerScene();
+  const falls::Body box = scene.bodies[1];
+  scene.bodies.resize(1);
+  for (int i = 0; i < 50; ++i) {
+    falls::Body& one = scene.bodies.emplace_back(box);
+    one.name += std::to_string(i);
+    one.position_m = {0.11 * (i % 5), 0.11 * (i / 5 % 5), 0.2 + 0.15 * i};
+  }
+  scene.seconds = 20;
+  return scene;
+}
+
+int Main(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  const Engine engine = EngineOf(words.empty() ? "bullet" : words[0]);
+  const std::vector<std::pair<std::string, falls::FallScene>> scenes = {{"air", AirScene()},
+                                                                        {"bounce", BounceScene()},
+                                                                        {"corner", CornerScene()},
+                                                                        {"blocks", BlocksScene()}};
+  for (const auto& [name, scene] : scenes) {
+    for (const int rate : {24, 30, 60, 120, 240}) {
+      if (words.size() < 2 || words[1] == name) PrintRow(name, scene, engine, rate);
+    }
+  }
+  if (words.size() > 1 && words[1] == "crowd") PrintRow("crowd", CrowdScene(), engine, 60);
+  return 0;
+}
+
+}  // namespace
+}  // namespace carillon::motion
+
+int main(int argc, char** argv) { return carillon::motion::Main(argc, argv); }

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/client_sdk/motion/fall_truth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+
+namespace carillon::motion {
+namespace {
+
+using Key = std::pair<uint32_t, uint32_t>;
+constexpr double kTogetherS = 0.008, kLeastShare = 0.03;
+
+/// One step of one pair.
+struct StepImpulse {
+  Vector impulse = Vector::Zero(), moment = Vector::Zero();  ///< of points, weighted by size
+  double size = 0;
+};
+
+double ReducedMass(const Motion& motion, const PairBlow& blow) {
+  const auto inverse = [&](uint32_t body) {
+    const MovingBody& b = motion.bodies[body];
+    return b.mass_kg > 0 ? 1 / b.mass_kg : 0;
+  };
+  return 1 / (inverse(blow.a) + inverse(blow.b));
+}
+
+Vector ToVector(const falls::Vector& v) { return {v[0], v[1], v[2]}; }
+
+BodySurface BoxSurface(const std::vector<falls::Box>& boxes) {
+  BodySurface surface;
+  for (const falls::Box& box : boxes) {
+    const auto first = static_cast<uint32_t>(surface.vertices_m.size());
+    for (uint32_t i = 0; i < 8; ++i) {
+      const Vector sign((i & 1U) != 0 ? 0.5 : -0.5, (i & 2U) != 0 ? 0.5 : -0.5,
+                        (i & 4U) != 0 ? 0.5 : -0.5);
+      surface.vertices_m.push_back(ToVector(box.position_m) +
+                                   ToVector(box.sides_m).cwiseProduct(sign));
+    }
+    for (const std::array<uint32_t, 4>& q : {std::array<uint32_t, 4>{0, 2, 3, 1},
+                                             {4, 5, 7, 6},
+                                             {0, 1, 5, 4},
+                                             {2, 6, 7, 3},
+                                             {0, 4, 6, 2},
+                                             {1, 3, 7, 5}}) {
+      surface.triangles.push_back({first + q[0], first + q[1], first + q[2]});
+      surface.triangles.push_back({first + q[0], first + q[2], first + q[3]});
+    }
+  }
+  return surface;
+}
+
+/// A sphere of triangles: the poles, and rings of vertices between them.
+BodySurface BallSurface(double radius) {
+  constexpr uint32_t kRings = 24, kAround = 48;
+  BodySurface surface;
+  surface.vertices_m.push_back({0, 0, radius});
+  for (uint32_t ring = 1; ring < kRings; ++ring) {
+    const double down = std::numbers::pi * ring / kRings;
+    for (uint32_t i = 0; i < kAround; ++i) {
+      const double angle = 2 * std::numbers::pi * (i + (ring % 2) * 0.5) / kAround;
+      surface.vertices_m.push_back(radius * Vector(std::sin(down) * std::cos(angle),
+                                                   std::sin(down) * std::sin(angle),
+                                                   std::cos(down)));
+    }
+  }
+  surface.vertices_m.push_back({0, 0, -radius});
+  const uint32_t last = 1 + (kRings - 2) * kAround, south = last + kAround;
+  for (uint32_t i = 0; i < kAround; ++i) {
+    const uint32_t j = (i + 1) % kAround;
+    surface.triangles.push_back({0, 1 + i, 1 + j});
+    surface.triangles.push_back({south, last + j, last + i});
+    for (uint32_t ring = 0; ring + 2 < kRings; ++ring) {
+      const uint32_t upper = 1 + ring * kAround, lower = upper + kAround;
+      surface.triangles.push_back({upper + i, lower + i, lower + j});
+      surface.triangles.push_back({upper + i, lower + j, upper + j});
+    }
+  }
+  return surface;
+}
+
+void Round(BodyPose& pose) {
+  for (int i = 0; i < 3; ++i) pose.position_m[i] = static_cast<float>(pose.position_m[i]);
+  for (int i = 0; i < 4; ++i)
+    pose.orientation.coeffs()[i] = static_cast<float>(pose.orientation.coeffs()[i]);
+}
+
+MovingBody ToMoving(const falls::Body& body, double friction) {
+  MovingBody moving;
+  moving.name = body.name;
+  moving.surface = SurfaceOf(body);
+  moving.mass_kg = body.mass_kg;
+  moving.inertia_kg_m2 = ToVector(body.inertia_kg_m2).asDiagonal();
+  moving.friction = friction;
+  const auto& q = body.orientation;
+  BodyPose pose{ToVector(body.position_m), Turn(q[0], q[1], q[2], q[3]).normalized()};
+  Round(pose);
+  moving.poses.push_back(pose);
+  return moving;
+}
+
+/// The contacts of a simulation, step by step.
+class TruthReader {
+ public:
+  explicit TruthReader(const Motion& motion) : motion_(motion) {
+    for (uint32_t i = 0; i < motion.bodies.size(); ++i) {
+      if (motion.bodies[i].mass_kg == 0) fixed_ = i;
+    }
+  }
+
+  void Read(const v1::ContactStep& step, const std::vector<BodyPose>& poses) {
+    ++steps_;
+    for (const v1::Contact& row : step.contacts()) {
+      const uint32_t a = row.object() - 1;
+      const uint32_t b = row.has_second() ? row.second().object() - 1 : fixed_;
+      const auto& j = row.impulse_newton_seconds();
+      const Vector impulse = poses[a].orientation * Vector(j.x(), j.y(), j.z());
+      std::vector<StepImpulse>& series = series_[{a, b}];
+      series.resize(steps_);
+      series.back().impulse += impulse;
+      series.back().size += impulse.norm();
+      series.back().moment +=
+          impulse.norm() * Vector(row.point_m().x(), row.point_m().y(), row.point_m().z());
+    }
+  }
+
+  std::vector<PairBlow> Blows(double step_s) {
+    std::vector<PairBlow> blows;
+    for (auto& [key, series] : series_) {
+      series.resize(steps_);
+      AddBlows(key, series, step_s, blows);
+    }
+    std::ranges::sort(blows, {}, &PairBlow::time_s);
+    return blows;
+  }
+
+ private:
+  void AddBlows(const Key& key, const std::vector<StepImpulse>& series, double step_s,
+                std::vector<PairBlow>& blows) const {
+    double last = -1, sum = 0, moment = 0;
+    PairBlow blow{.a = key.first, .b = key.second};
+    const double least = 0.02 * ReducedMass(motion_, blow);
+    const auto close = [&] {
+      if (sum > 0) {
+        blow.time_s = moment / sum;
+        blow.point_m /= sum;
+        blows.push_back(blow);
+      }
+      blow = {.a = key.first, .b = key.second};
+      sum = moment = 0;
+    };
+    for (size_t i = 0; i < series.size(); ++i) {
+      std::vector<double> near;
+      for (size_t k = i > 24 ? i - 24 : 0; k < std::min(series.size(), i + 25); ++k) {
+        near.push_back(series[k].size);
+      }
+      std::ranges::nth_element(near, near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2));
+      if (series[i].size < least + 3 * near[near.size() / 2]) continue;
+      // An engine of half implicit steps applies an impulse at the beginning of its step.
+      const double time = static_cast<double>(i) * step_s;
+      if (sum > 0 && time - last > kTogetherS) close();
+      last = time;
+      sum += series[i].size;
+      moment += series[i].size * time;
+      blow.impulse += series[i].impulse;
+      blow.point_m += series[i].moment;
+    }
+    close();
+  }
+
+  const Motion& motion_;
+  uint32_t fixed_ = 0;
+  size_t steps_ = 0;
+  std::map<Key, std::vector<StepImpulse>> series_;
+};
+
+std::vector<PairBlow> Strong(const Motion& motion, std::vector<PairBlow> blows, double strongest) {
+  std::erase_if(blows, [&](const PairBlow& blow) {
+    return blow.impulse.norm() / std::sqrt(ReducedMass(motion, blow)) < kLeastShare * strongest;
+  });
+  return blows;
+}
+
+double Quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::ranges::sort(values);
+  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+}  // namespace
+
+BodySurface SurfaceOf(const falls::Body& body) {
+  if (const auto* ball = std::get_if<falls::Ball>(&body.shape)) return BallSurface(ball->radius_m);
+  if (const auto* boxes = std::get_if<std::vector<falls::Box>>(&body.shape))
+    return BoxSurface(*boxes);
+  return BoxSurface({{.sides_m = {20, 20, 1}, .position_m = {0, 0, -0.5}}});
+}
+
+Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_frame, double step_s) {
+  Fall fall;
+  fall.motion.frame_s = steps_per_frame * step_s;
+  fall.motion.gravity_m_per_s2 = ToVector(scene.gravity_m_per_s2);
+  falls::FallScene heard = scene;
+  std::vector<BodyPose> poses;
+  for (falls::Body& body : heard.bodies) {
+    if (body.mass_kg > 0) body.model = "heard";
+    fall.motion.bodies.push_back(ToMoving(body, 1.2 * scene.friction));
+    poses.push_back(fall.motion.bodies.back().poses.front());
+  }
+  const falls::Simulation simulation = engine(heard, step_s);
+  TruthReader truth(fall.motion);
+  const int steps = static_cast<int>(std::lround(scene.seconds / step_s));
+  for (int i = 1; i <= steps; ++i) {
+    const v1::ContactStep step = simulation();
+    truth.Read(step, poses);
+    for (int n = 0; n < step.poses().object_size(); ++n) {
+      const auto body = step.poses().object(n) - 1;
+      const auto* x = &step.poses().position_m()[3 * n];
+      const auto* q = &step.poses().orientation()[4 * n];
+      poses[body] = {{x[0], x[1], x[2]}, Turn(q[0], q[1], q[2], q[3]).normalized()};
+      Round(poses[body]);
+      if (i % steps_per_frame == 0) fall.motion.bodies[body].poses.push_back(poses[body]);
+    }
+  }
+  fall.blows = truth.Blows(step_s);
+  return fall;
+}
+
+std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& found) {
+  std::map<Key, std::vector<std::pair<PairBlow, double>>> of_pair;
+  for (const FoundBlow& blow : found.blows) {
+    const bool swapped = motion.bodies[blow.a].mass_kg == 0;
+    const Key key = swapped ? Key{blow.b, blow.a} : Key{blow.a, blow.b};
+    const double time = static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
+    const Vector j = (swapped ? -1 : 1) * blow.impulse_newton_seconds;
+    auto& blows = of_pair[key];
+    if (blows.empty() || time - blows.back().second > kTogetherS) {
+      blows.push_back({{.a = key.first, .b = key.second}, time});
+    }
+    PairBlow& last = blows.back().first;
+    blows.back().second = time;
+    const double before = last.impulse.norm(), size = j.norm();
+    last.time_s = (before * last.time_s + size * time) / (before + size);
+    last.point_m = (before * last.point_m + size * (swapped ? blow.point_b_m : blow.point_a_m)) /
+                   (before + size);
+    last.impulse += j;
+  }
+  std::vector<PairBlow> all;
+  for (const auto& [key, blows] : of_pair) {
+    for (const auto& [blow, last] : blows) all.push_back(blow);
+  }
+  std::ranges::sort(all, {}, &PairBlow::time_s);
+  return all;
+}
+
+Likeness Compare(const Fall& fall, const FoundContacts& contacts) {
+  const Motion& motion = fall.motion;
+  double strongest = 0;
+  for (const PairBlow& blow : fall.blows) {
+    strongest = std::max(strongest, blow.impulse.norm() / std::sqrt(ReducedMass(motion, blow)));
+  }
+  const std::vector<PairBlow> truth = Strong(motion, fall.blows, strongest);
+  const std::vector<PairBlow> found = Strong(motion, Clustered(motion, contacts), strongest);
+  std::vector<std::tuple<double, size_t, size_t>> matches;
+  const double within = std::max(1.01 * motion.frame_s, 0.012);
+  for (size_t i = 0; i < truth.size(); ++i) {
+    for (size_t k = 0; k < found.size(); ++k) {
+      const double dt = std::abs(truth[i].time_s - found[k].time_s);
+      if (truth[i].a == found[k].a && truth[i].b == found[k].b && dt < within) {
+        matches.emplace_back(dt, i, k);
+      }
+    }
+  }
+  std::ranges::sort(matches);
+  std::set<size_t> used_true, used_found;
+  Likeness likeness{.true_count = static_cast<int>(truth.size())};
+  std::vector<double> dts, sizes, vectors, points;
+  double total = 0;
+  for (const PairBlow& blow : truth) total += blow.impulse.norm();
+  for (const auto& [dt, i, k] : matches) {
+    if (used_true.contains(i) || used_found.contains(k)) continue;
+    used_true.insert(i);
+    used_found.insert(k);
+    ++likeness.found_count;
+    likeness.found_share += truth[i].impulse.norm() / total;
+    dts.push_back(dt);
+    sizes.push_back(std::abs(found[k].impulse.norm() / truth[i].impulse.norm() - 1));
+    vectors.push_back((found[k].impulse - truth[i].impulse).norm() / truth[i].impulse.norm());
+    points.push_back((found[k].point_m - truth[i].point_m).norm());
+  }
+  for (size_t k = 0; k < found.size(); ++k) {
+    if (used_found.contains(k)) continue;
+    ++likeness.false_count;
+    likeness.false_share += found[k].impulse.norm() / total;
+  }
+  likeness.median_dt_s = Quantile(dts, 0.5);
+  likeness.dt90_s = Quantile(dts, 0.9);
+  likeness.median_size_error = Quantile(sizes, 0.5);
+  likeness.median_vector_error = Quantile(vectors, 0.5);
+  likeness.median_point_m = Quantile(points, 0.5);
+  return likeness;
+}
+
+namespace {
+
+falls::Vector BoxInertia(double mass, const falls::Vector& s) {
+  return {mass * (s[1] * s[1] + s[2] * s[2]) / 12, mass * (s[0] * s[0] + s[2] * s[2]) / 12,
+          mass * (s[0] * s[0] + s[1] * s[1]) / 12};
+}
+
+falls::Body BoxBody(const std::string& name, const falls::Vector& sides, double mass) {
+  return {.name = name,
+          .shape = std::vector<falls::Box>{{.sides_m = sides}},
+          .mass_kg = mass,
+          .inertia_kg_m2 = BoxInertia(mass, sides),
+          .model = "",
+          .material = ""};
+}
+
+falls::Body BallBody(const std::string& name, double radius, double mass) {
+  const double moment = 0.4 * mass * radius * radius;
+  return {.name = name,
+          .shape = falls::Ball{radius},
+          .mass_kg = mass,
+          .inertia_kg_m2 = {moment, moment, moment},
+          .model = "",
+          .material = ""};
+}
+
+falls::Body Floor() {
+  return {.name = "floor", .shape = falls::Plane{}, .model = "", .material = ""};
+}
+
+}  // namespace
+
+/// An oak box of 12 x 9 x 6 cm that lands on two or three corners 15 to 60 ms apart.
+falls::FallScene CornerScene() {
+  falls::Body box = BoxBody("box", {0.12, 0.09, 0.06}, 0.45);
+  box.position_m = {0, 0, 0.3};
+  box.orientation = {0.84419, 0.3485584, -0.4056972, -0.03549596};
+  box.velocity_m_per_s = {0.3, 0, 0};
+  return {.friction = 0.5, .restitution = 0.3, .seconds = 1.2, .bodies = {Floor(), box}};
+}
+
+falls::FallScene BounceScene() {
+  falls::Body ball = BallBody("ball", 0.03, 0.1);
+  ball.position_m = {0, 0, 0.4};
+  ball.velocity_m_per_s = {0.5, 0.1, 0};
+  return {.friction = 0.5, .restitution = 0.6, .seconds = 1.8, .bodies = {Floor(), ball}};
+}
+
+falls::FallScene AirScene() {
+  falls::Body one = BoxBody("one", {0.1, 0.08, 0.06}, 0.4),
+              two = BoxBody("two", {0.07, 0.07, 0.12}, 0.3);
+  one.position_m = {-0.2, 0, 2};
+  one.velocity_m_per_s = {1, 0, 0};
+  one.angular_velocity_rad_per_s = {3, 1, -2};
+  two.position_m = {0.2, 0.02, 2.01};
+  two.velocity_m_per_s = {-1, 0, 0};
+  two.angular_velocity_rad_per_s = {-1, 4, 1};
+  return {.friction = 0.5, .restitution = 0.3, .seconds = 0.5, .bodies = {Floor(), one, two}};
+}
+
+/// Six hollow blocks of wood in a pile, and a ball that rolls into them (scene_makers.py).
+falls::FallScene BlocksScene() {
+  constexpr double kSide = 0.05;
+  const double mass = 550 * std::pow(kSide, 3) * (1 - std::pow(0.9, 3)), radius = 0.6 * kSide;
+  falls::FallScene scene{.friction = 0.5, .restitution = 0, .seconds = 2.5, .bodies = {Floor()}};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3 - row; ++column) {
+      falls::Body block =
+          BoxBody("block " + std::to_string(scene.bodies.size()), {kSide, kSide, kSide}, mass);
+      block.position_m = {0, (column - (2 - row) / 2.0) * 1.1 * kSide, (row + 0.5) * kSide};
+      scene.bodies.push_back(block);
+    }
+  }
+  falls::Body ball = BallBody("ball", radius, 3 * mass);
+  ball.position_m = {-8 * kSide, 0.1 * kSide, radius};
+  ball.velocity_m_per_s = {2, 0, 0};
+  ball.angular_velocity_rad_per_s = {0, 2 / radius, 0};
+  scene.bodies.push_back(ball);
+  return scene;
+}
+
+}  // namespace carillon::motion

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/motion/find_contacts.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client_sdk/motion/contact_steps.h"
+#include "tests/client_sdk/motion/fall_truth.h"
+
+namespace carillon::motion {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kGravity = 9.81;
+
+falls::Body BoxOf(const falls::Vector& sides) {
+  return {.name = "box",
+          .shape = std::vector<falls::Box>{{.sides_m = sides}},
+          .model = "",
+          .material = ""};
+}
+
+MovingBody Floor() {
+  MovingBody floor;
+  floor.name = "floor";
+  floor.surface =
+      SurfaceOf({.name = "floor", .shape = falls::Plane{}, .model = "", .material = ""});
+  floor.poses.emplace_back();
+  return floor;
+}
+
+MovingBody Cube(double side_m, double mass_kg) {
+  MovingBody cube;
+  cube.name = "cube";
+  cube.surface = SurfaceOf(BoxOf({side_m, side_m, side_m}));
+  cube.mass_kg = mass_kg;
+  cube.inertia_kg_m2 = mass_kg * side_m * side_m / 6 * Matrix::Identity();
+  return cube;
+}
+
+/// A ball that falls 0.5 m and bounces once with the restitution 0.7, without an engine.
+struct Bounce {
+  Motion motion;
+  double time_s = 0, impulse = 0;
+};
+Bounce OneBounce(double frame_s, double first_s) {
+  constexpr double kRadius = 0.03, kMass = 0.1, kHeight = 0.5, kRestitution = 0.7;
+  Bounce bounce;
+  bounce.motion.frame_s = frame_s;
+  MovingBody ball;
+  ball.name = "ball";
+  ball.surface =
+      SurfaceOf({.name = "ball", .shape = falls::Ball{kRadius}, .model = "", .material = ""});
+  ball.mass_kg = kMass;
+  ball.inertia_kg_m2 = 0.4 * kMass * kRadius * kRadius * Matrix::Identity();
+  const double fall_s = std::sqrt(2 * kHeight / kGravity), speed = kGravity * fall_s;
+  bounce.time_s = first_s + fall_s;
+  bounce.impulse = kMass * speed * (1 + kRestitution);
+  for (double t = 0; t < bounce.time_s + 0.4; t += frame_s) {
+    const double before = t - first_s, after = t - bounce.time_s;
+    const double height = after < 0 ? kHeight - kGravity * before * before / 2
+                                    : kRestitution * speed * after - kGravity * after * after / 2;
+    ball.poses.push_back({{0, 0, kRadius + height}, Turn::Identity()});
+  }
+  bounce.motion.bodies = {Floor(), ball};
+  return bounce;
+}
+
+TEST(FindContacts, TimesOneBounceWhereverItLiesInItsFrame) {
+  for (const double frame_s : {1 / 23.976, 1 / 24.0, 1 / 60.0, 1 / 120.0}) {
+    for (const double first_s : {0.0, 0.003, 0.0101, 0.0173, 0.0256}) {
+      const Bounce bounce = OneBounce(frame_s, first_s);
+      const auto found = FindContacts(bounce.motion);
+      ASSERT_TRUE(found.ok()) << found.status();
+      const std::vector<PairBlow> blows = Clustered(bounce.motion, *found);
+      ASSERT_EQ(blows.size(), 1U) << frame_s << " " << first_s;
+      // The ball is faceted, and the places are searched at ten times of a frame at most.
+      EXPECT_NEAR(blows[0].time_s, bounce.time_s, 0.02 * frame_s);
+      EXPECT_NEAR(blows[0].impulse.z(), bounce.impulse, 4e-3 * bounce.impulse);
+      EXPECT_LT(found->confidence.unexplained, 3e-4);
+    }
+  }
+}
+
+TEST(FindContacts, FindsBouncesInBulletAtAnyFrameRate) {
+  for (const int rate : {24, 30, 60, 120, 240}) {
+    const Fall fall = Drop(BounceScene(), falls::FallInBullet, 2400 / rate);
+    const auto found = FindContacts(fall.motion);
+    ASSERT_TRUE(found.ok()) << found.status();
+    const Likeness is = Compare(fall, *found);
+    // Two bounces within a frame of 24 a second are found as one.
+    EXPECT_GE(is.found_share, rate == 24 ? 0.9 : 0.95) << rate;
+    EXPECT_LE(is.false_share, 0.03) << rate;
+    EXPECT_LT(is.median_dt_s, 1e-4) << rate;
+    EXPECT_LT(is.median_vector_error, 0.01) << rate;
+    EXPECT_LT(is.median_point_m, 0.001) << rate;
+  }
+}
+
+TEST(FindContacts, FindsAllCornersOfABoxFrom120FramesOn) {
+  for (const int rate : {120, 240}) {
+    const Fall fall = Drop(CornerScene(), falls::FallInBullet, 2400 / rate);
+    const auto found = FindContacts(fall.motion);
+    ASSERT_TRUE(found.ok()) << found.status();
+    const Likeness is = Compare(fall, *found);
+    EXPECT_EQ(is.found_count, is.true_count) << rate;
+    EXPECT_LE(is.false_share, 0.03) << rate;
+    EXPECT_LT(is.median_dt_s, 5e-4) << rate;
+    EXPECT_LT(is.median_vector_error, 0.05) << rate;
+  }
+}
+
+TEST(FindContacts, FindsMostOfAPileAtSixtyFramesAndCallsItAmbiguous) {
+  const Fall fall = Drop(BlocksScene(), falls::FallInBullet, 40);
+  const auto found = FindContacts(fall.motion);
+  ASSERT_TRUE(found.ok()) << found.status();
+  const Likeness is = Compare(fall, *found);
+  EXPECT_GE(is.found_share, 0.8);
+  EXPECT_LE(is.false_share, 0.15);
+  EXPECT_LT(found->confidence.unexplained, 0.001);
+  EXPECT_GT(found->confidence.ambiguity, 0.3);
+}
+
+TEST(FindContacts, FindsEqualAndOppositeImpulsesInTheAir) {
+  const Fall fall = Drop(AirScene(), falls::FallInBullet, 20);
+  const auto found = FindContacts(fall.motion);
+  ASSERT_TRUE(found.ok()) << found.status();
+  const Likeness is = Compare(fall, *found);
+  EXPECT_EQ(is.found_count, is.true_count);
+  EXPECT_EQ(is.false_count, 0);
+  EXPECT_LT(is.median_dt_s, 1e-4);
+  EXPECT_LT(is.median_vector_error, 0.05);
+}
+
+TEST(FindContacts, TakesRestForALoadOfTheWeight) {
+  Motion motion;
+  motion.bodies = {Floor(), Cube(0.1, 2)};
+  motion.bodies[1].poses.assign(120, {{0.3, 0, 0.05}, Turn::Identity()});
+  const auto found = FindContacts(motion);
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_TRUE(found->blows.empty());
+  std::vector<double> weight(120, 0);
+  for (const FoundLoad& load : found->loads) {
+    weight[load.frame] += (load.a == 1 ? 1 : -1) * load.force_newtons.z();
+  }
+  for (size_t k = 2; k + 2 < weight.size(); ++k) {
+    EXPECT_NEAR(weight[k], 2 * kGravity, 0.02 * 2 * kGravity) << k;
+  }
+}
+
+TEST(FindContacts, FindsTheSameBlowsInATurnedAndShiftedScene) {
+  const Fall fall = Drop(CornerScene(), falls::FallInBullet, 20);
+  Motion turned = fall.motion;
+  const Turn to_y_up(Eigen::AngleAxisd(-std::numbers::pi / 2, Vector::UnitX()));
+  turned.gravity_m_per_s2 = to_y_up * turned.gravity_m_per_s2;
+  turned.first_time_s = 17;
+  for (MovingBody& body : turned.bodies) {
+    for (BodyPose& pose : body.poses) {
+      pose = {to_y_up * pose.position_m + Vector(1, 2, 3), to_y_up * pose.orientation};
+    }
+  }
+  std::ranges::reverse(turned.bodies);
+  const auto a = FindContacts(fall.motion), b = FindContacts(turned);
+  ASSERT_TRUE(a.ok() && b.ok());
+  const std::vector<PairBlow> first = Clustered(fall.motion, *a), second = Clustered(turned, *b);
+  ASSERT_EQ(first.size(), second.size());
+  for (size_t i = 0; i < first.size(); ++i) {
+    EXPECT_NEAR(first[i].time_s, second[i].time_s, 3e-4);
+    // The cone of friction and the order of the unknowns leave some freedom.
+    EXPECT_NEAR(first[i].impulse.norm(), second[i].impulse.norm(), 0.05 * first[i].impulse.norm());
+  }
+}
+
+TEST(FindContacts, SaysThatWrongPhysicsDoNotExplainTheMotion) {
+  const Fall fall = Drop(CornerScene(), falls::FallInBullet, 20);
+  const auto right = FindContacts(fall.motion);
+  ASSERT_TRUE(right.ok()) << right.status();
+  EXPECT_LT(right->confidence.unexplained, 1e-4);
+  Motion weightless = fall.motion;
+  weightless.gravity_m_per_s2.setZero();
+  Motion heavy = fall.motion;
+  heavy.bodies[1].inertia_kg_m2 *= 1.5;
+  Motion lone = fall.motion;
+  lone.bodies[0].poses[0].position_m.z() = -5;  // no floor is near
+  for (const auto& [motion, least] :
+       {std::pair{weightless, 0.01}, std::pair{heavy, 5e-4}, std::pair{lone, 0.9}}) {
+    const auto found = FindContacts(motion);
+    ASSERT_TRUE(found.ok()) << found.status();
+    EXPECT_GT(found->confidence.unexplained, least);
+    EXPECT_EQ(found->confidence.worst_body, 1U);
+  }
+}
+
+/// A bar that swings by a hinge at its end, as the equation of the pendulum says.
+Motion Pendulum() {
+  constexpr double kLength = 0.4, kMass = 0.5, kStepS = 1e-4;
+  MovingBody bar;
+  bar.name = "bar";
+  bar.surface = SurfaceOf(BoxOf({0.02, 0.02, kLength}));
+  bar.mass_kg = kMass;
+  const double across = kMass * kLength * kLength / 12;
+  bar.inertia_kg_m2 = Vector(across, across, across / 100).asDiagonal();
+  Motion motion;
+  const double about_hinge = across + kMass * kLength * kLength / 4;
+  double angle = 1, speed = 0;
+  for (int i = 0; i <= 10000; ++i) {
+    if (i % 100 == 0) {
+      const Turn turn(Eigen::AngleAxisd(angle, Vector::UnitY()));
+      bar.poses.push_back({turn * Vector(0, 0, -kLength / 2), turn});
+    }
+    // The midpoint method: its error of 1e-8 is far below the frames' own.
+    const double rate = -kMass * kGravity * kLength / 2 / about_hinge;
+    const double half = angle + speed * kStepS / 2,
+                 half_speed = speed + rate * std::sin(angle) * kStepS / 2;
+    angle += half_speed * kStepS;
+    speed += rate * std::sin(half) * kStepS;
+  }
+  motion.frame_s = 0.01;
+  motion.bodies = {bar};
+  return motion;
+}
+
+TEST(FindContacts, ExplainsASwingByItsHinge) {
+  Motion motion = Pendulum();
+  const auto alone = FindContacts(motion);
+  ASSERT_TRUE(alone.ok()) << alone.status();
+  EXPECT_GT(alone->confidence.unexplained, 0.9);
+  motion.joints = {
+      {.body = 0, .anchor_m = {0, 0, 0.2}, .axis = Vector::UnitY(), .kind = JointKind::kHinge}};
+  const auto hung = FindContacts(motion);
+  ASSERT_TRUE(hung.ok()) << hung.status();
+  EXPECT_LT(hung->confidence.unexplained, 1e-4);
+  EXPECT_TRUE(hung->blows.empty());
+}
+
+TEST(FindContacts, RefusesWhatItCannotRead) {
+  const Bounce bounce = OneBounce(1 / 60.0, 0);
+  const auto reason = [](const Motion& motion) { return FindContacts(motion).status().ToString(); };
+  Motion broken = bounce.motion;
+  broken.bodies[1].poses[7].position_m.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(reason(broken), HasSubstr("pose 7 of ball"));
+  Motion brief = bounce.motion;
+  brief.bodies[1].poses.resize(3);
+  EXPECT_THAT(reason(brief), HasSubstr("3 frames"));
+  Motion still = bounce.motion;
+  still.bodies[1].mass_kg = 0;
+  EXPECT_THAT(reason(still), HasSubstr("no body with a mass moves"));
+  Motion fast = bounce.motion;
+  for (size_t k = 0; k < fast.bodies[1].poses.size(); ++k) {
+    fast.bodies[1].poses[k].orientation =
+        Turn(Eigen::AngleAxisd(2.8 * static_cast<double>(k), Vector::UnitZ()));
+  }
+  EXPECT_THAT(reason(fast), HasSubstr("export more frames"));
+  EXPECT_TRUE(FindContacts(fast, true).ok());
+}
+
+TEST(ToSteps, GivesABlowInTheFrameOfItsBodyAtItsTime) {
+  const Fall fall = Drop(CornerScene(), falls::FallInBullet, 20);
+  const auto found = FindContacts(fall.motion);
+  ASSERT_TRUE(found.ok()) << found.status();
+  const std::vector<v1::ContactStep> steps =
+      ToSteps(fall.motion, *found, {.handles = {0, 7}, .silent_striker = "wood"});
+  ASSERT_EQ(steps.size(), fall.motion.frame_count());
+  size_t impacts = 0;
+  for (const v1::ContactStep& step : steps) {
+    for (const v1::Contact& row : step.contacts()) {
+      EXPECT_EQ(row.object(), 7U);
+      const auto& p = row.point_m();
+      // Only corners and edges of the box touch the floor.
+      EXPECT_NEAR(std::abs(p.x()), 0.06, 0.001);
+      EXPECT_NEAR(std::abs(p.y()), 0.045, 0.001);
+      EXPECT_NEAR(std::abs(p.z()), 0.03, 0.001);
+      if (row.kind() != v1::CONTACT_KIND_IMPACT) continue;
+      ++impacts;
+      EXPECT_LT(row.time_offset_s(), fall.motion.frame_s);
+      EXPECT_EQ(row.hertz().striker(), "wood");
+    }
+  }
+  EXPECT_EQ(impacts, found->blows.size());
+  EXPECT_GE(impacts, 7U);
+}
+
+}  // namespace
+}  // namespace carillon::motion

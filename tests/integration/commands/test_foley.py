@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`carillon foley`: a bar that falls flat on a floor and bounces once is heard when it lands, from a table of poses and
+from a glTF; what is no motion, or not explained by contacts, is refused by name."""
+
+import json
+import struct
+import unittest
+
+import numpy
+
+import carillon
+import sound
+from daemon import BIN, DaemonTest
+
+GRAVITY, HEIGHT_M, RESTITUTION, RATE_HZ = 9.81, 0.2, 0.6, 60
+SIDES_M = (0.2, 0.02, 0.01)
+MASS_KG = 7850 * 0.2 * 0.02 * 0.01  # of structural_steel
+FIRST_S = 0.0071
+LANDS_S = FIRST_S + (2 * HEIGHT_M / GRAVITY) ** 0.5
+SPEED_M_PER_S = (2 * GRAVITY * HEIGHT_M) ** 0.5
+IMPULSE_N_S = MASS_KG * SPEED_M_PER_S * (1 + RESTITUTION)
+
+BOX = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
+       (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]
+
+
+def box(sides):
+    """Corners about the centre, and triangles."""
+    return numpy.array([[side * ((i >> axis & 1) - 0.5) for axis, side in enumerate(sides)] for i in range(8)]), BOX
+
+
+def heights():
+    """Times of the frames, and the height of the bar's centre."""
+    times = numpy.arange(0, LANDS_S + 0.2, 1 / RATE_HZ)
+    before, after = times - FIRST_S, times - LANDS_S
+    height = numpy.where(after < 0, HEIGHT_M - GRAVITY * before**2 / 2,
+                         RESTITUTION * SPEED_M_PER_S * after - GRAVITY * after**2 / 2)
+    return times, height + SIDES_M[2] / 2
+
+
+def write_obj(path, vertices, triangles):
+    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in vertices)
+                    + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles))
+
+
+def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel"):
+    """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z."""
+    blob, views, accessors = b"", [], []
+
+    def accessor(array, kind, component):
+        nonlocal blob
+        data = numpy.ascontiguousarray(array, dtype="<f4" if component == 5126 else "<u2").tobytes()
+        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(data)})
+        blob += data + b"\0" * (-len(data) % 4)
+        accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind})
+        return len(accessors) - 1
+
+    def mesh(sides, named):
+        vertices, triangles = box(sides)
+        corners = vertices[numpy.array(triangles).ravel()]  # a corner for each triangle, as exporters write them
+        primitive = {"attributes": {"POSITION": accessor(corners, "VEC3", 5126)}, "material": named}
+        return {"primitives": [primitive]}
+
+    times, height = heights()
+    half = 0.5**0.5
+    bar = {"name": "Bar", "mesh": 0, "translation": [0, 0, 0]}
+    if skin:
+        bar["skin"] = 0
+    if mass:
+        bar["extensions"] = {"KHR_physics_rigid_bodies": {"motion": {"mass": mass}}}
+    gltf = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
+        "materials": [{"name": material}, {"name": "Ground"}],
+        "meshes": [mesh(SIDES_M, 0), mesh((4, 0.2, 4), 1)],
+        # The bar's own z, along which it falls, is the scene's y.
+        "nodes": [{"name": "Turned", "rotation": [-half, 0, 0, half], "children": [1]}, bar,
+                  {"name": "Ground", "mesh": 1, "translation": [0, -0.1, 0]},
+                  {"name": "Camera", "camera": 0, "translation": [0, 0.3, 1]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+        "animations": [{"samplers": [{"input": accessor(times[keys], "SCALAR", 5126),
+                                      "output": accessor([(0, 0, z) for z in height[keys]], "VEC3", 5126)}],
+                        "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}],
+        "bufferViews": views, "accessors": accessors}
+    if skin:
+        gltf["skins"] = [{"joints": [2]}]
+    gltf["buffers"] = [{"byteLength": len(blob)}]
+    text = json.dumps(gltf).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(blob), len(text), 0x4E4F534A) + text
+                     + struct.pack("<II", len(blob), 0x004E4942) + blob)
+
+
+def impacts(path):
+    """Times, and impulses in the scene's vertical, of the impacts of a trace."""
+    trace = carillon.Trace.read(path)
+    return [(step.time_s + row.time_offset_s, row.impulse_newton_seconds.z)
+            for step in trace.steps for row in step.contacts if row.kind == 2]
+
+
+class FoleyTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        write_obj(cls.folder / "bar.obj", *box(SIDES_M))
+        times, height = heights()
+        rows = "".join(f"{t:.9g},Bar,0,0,{z:.9g},1,0,0,0\n" for t, z in zip(times, height))
+        (cls.folder / "fall.csv").write_text("t,body,x,y,z,qw,qx,qy,qz\n" + rows)
+        count = len(times)
+        numpy.savez(cls.folder / "fall.npz", times=times, bodies=numpy.array(["Bar"]),
+                    positions=numpy.stack([numpy.zeros(count), numpy.zeros(count), height], 1)[:, None],
+                    orientations=numpy.tile([1.0, 0, 0, 0], (count, 1, 1)))
+        write_gltf(cls.folder / "fall.glb")
+
+    def foley(self, file, *words, check=True):
+        return self.daemon.command("foley", self.folder / file, *words, check=check)
+
+    def table(self, file, *words, check=True):
+        return self.foley(file, "--mesh", f"Bar={self.folder / 'bar.obj'}", "--material", "Bar=structural_steel",
+                          *words, check=check)
+
+    def check_impacts(self, path, impulse=IMPULSE_N_S):
+        found = impacts(path)
+        self.assertGreater(len(found), 0)
+        for time, _ in found:
+            self.assertAlmostEqual(time, LANDS_S, delta=5e-5)
+        self.assertAlmostEqual(sum(z for _, z in found), impulse, delta=1e-3 * impulse)
+
+    def test_a_table_and_an_archive_give_the_impact_of_the_landing(self):
+        for file in ("fall.csv", "fall.npz"):
+            trace = self.folder / f"{file}.contacts"
+            done = self.table(file, "--floor", 0, "--trace", trace)
+            self.assertIn("unexplained", done.stderr)
+            self.check_impacts(trace)
+
+    def test_a_gltf_is_heard_when_it_lands_and_stems_add_up(self):
+        trace, wav, stems = (self.folder / name for name in ("glb.contacts", "glb.wav", "stems"))
+        self.foley("fall.glb", "--out", wav, "--trace", trace, "--stems", stems, "--channels", 2, "--tail", 1)
+        self.check_impacts(trace)
+        samples = sound.read_wave(wav)
+        loud = numpy.abs(samples).max(axis=-1)
+        first = numpy.argmax(loud > 0.05 * loud.max()) / sound.RATE
+        # The picture is heard without the delay of the air; the sound rises within a millisecond.
+        self.assertAlmostEqual(first, LANDS_S, delta=0.001)
+        numpy.testing.assert_array_equal(sound.read_wave(stems / "1-Bar.wav"), samples)
+
+    def test_a_mass_of_the_file_scales_the_impulse(self):
+        write_gltf(self.folder / "heavy.glb", mass=2 * MASS_KG)
+        trace = self.folder / "heavy.contacts"
+        self.foley("heavy.glb", "--trace", trace)
+        self.check_impacts(trace, 2 * IMPULSE_N_S)
+
+    def test_list_shows_bodies_and_cameras(self):
+        lines = self.foley("fall.glb", "--list").stdout
+        for pattern in (r"Bar +free +structural_steel +0\.314 kg +12 triangles, closed", r"Ground +fixed +silent",
+                        r"Camera +camera"):
+            self.assertRegex(lines, pattern)
+
+    def refused(self, reason, done):
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"carillon: {reason}: ", done.stderr)
+
+    def test_refusals_have_names(self):
+        out = ("--trace", self.folder / "none.contacts")
+        self.refused("MOTION_WITHOUT_CONTACT", self.table("fall.csv", *out, check=False))
+        rows = "".join(f"{k / 60},Bar,{max(0, k - 20) * 0.05},0,{SIDES_M[2] / 2},1,0,0,0\n" for k in range(40))
+        (self.folder / "pushed.csv").write_text(rows)  # by a hand that the file does not have
+        self.refused("MOTION_UNEXPLAINED", self.table("pushed.csv", "--floor", 0, *out, check=False))
+        self.refused("BODY_UNKNOWN", self.foley("fall.glb", "--material", "Cup=oak", *out, check=False))
+        self.refused("BODY_UNKNOWN", self.foley("fall.csv", *out, check=False))
+        write_gltf(self.folder / "thin.glb", keys=numpy.r_[0:10, 13, 14, 17:25])
+        self.refused("MOTION_TOO_COARSE", self.foley("thin.glb", *out, check=False))
+        write_gltf(self.folder / "still.glb", keys=slice(0, 1))
+        self.refused("NO_MOTION", self.foley("still.glb", *out, check=False))
+        write_gltf(self.folder / "skin.glb", skin=True)
+        self.refused("MOTION_MALFORMED", self.foley("skin.glb", *out, check=False))
+        vertices, triangles = box(SIDES_M)
+        write_obj(self.folder / "open.obj", vertices, triangles[1:])
+        self.refused("SURFACE_OPEN", self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'open.obj'}",
+                                                "--material", "Bar=structural_steel", *out, check=False))
+        self.assertFalse((self.folder / "none.contacts").exists())
+        self.table("fall.csv", "--force", *out)
+        self.assertEqual(impacts(self.folder / "none.contacts"), [])
+
+    def python_contacts(self, **options):
+        times, height = heights()
+        return carillon.motion.contacts(
+            {"Bar": carillon.motion.Body(box(SIDES_M), "structural_steel")}, times,
+            {"Bar": ([(0, 0, z) for z in height], [(1, 0, 0, 0)] * len(times))},
+            server=self.daemon.server, program=str(BIN / "carillon"), **options)
+
+    def test_python_finds_the_same_contacts(self):
+        found = self.python_contacts(floor=0)
+        found.trace.write(self.folder / "python.contacts")
+        self.check_impacts(self.folder / "python.contacts")
+        self.assertLess(found.unexplained, 1e-6)
+        with self.assertRaises(carillon.CarillonError) as refused:
+            self.python_contacts()
+        self.assertEqual(refused.exception.reason, "MOTION_WITHOUT_CONTACT")
+
+
+if __name__ == "__main__":
+    unittest.main()
