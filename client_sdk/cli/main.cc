@@ -136,6 +136,21 @@ void AddStruckObject(CLI::App& strike, StrikeOptions& options) {
       ->excludes(paper);
 }
 
+/// Adds the options of the file that a strike is written to.
+void AddStrikeFile(CLI::App& strike, StrikeOptions& options) {
+  CLI::Option* const out =
+      strike
+          .add_option("--out", options.out,
+                      "Write a WAV file, as `carillon render` does, and play nothing")
+          ->check([](const std::string& path) {
+            return WhyNotWritten(path, {".wav", ".wave"});
+          });
+  strike
+      .add_flag("--normalize", options.normalize,
+                "Scale the sound of the file to a peak of 0.9 of full scale")
+      ->needs(out);
+}
+
 /// Throws a CLI::ValidationError if the impulse is zero, because the strike would be silent.
 void CheckImpulse(const std::array<double, 3>& impulse) {
   if (impulse != std::array<double, 3>{}) return;
@@ -170,17 +185,7 @@ void AddStrike(CLI::App& app, Program& program) {
                                 "The time to ring, s [until the sound has decayed by 60 dB]"),
              0.001, 1e9, "leave --seconds out to hear the sound until it has decayed");
   AddMaterial(strike, options->material);
-  CLI::Option* const out =
-      strike
-          .add_option("--out", options->out,
-                      "Write a WAV file, as `carillon render` does, and play nothing")
-          ->check([](const std::string& path) {
-            return WhyNotWritten(path, {".wav", ".wave"});
-          });
-  strike
-      .add_flag("--normalize", options->normalize,
-                "Scale the sound of the file to a peak of 0.9 of full scale")
-      ->needs(out);
+  AddStrikeFile(strike, *options);
   strike.callback([&program, options] {
     CheckImpulse(options->impulse_newton_seconds);
     CheckJson(program, options->out);
