@@ -255,7 +255,7 @@ class Performance(BlockingBlock, PerformanceCalls):
 
     async def _open(self) -> None:
         self._requests: queue.SimpleQueue[Optional[performance_pb2.PerformRequest]] = queue.SimpleQueue()
-        requests: Iterator[performance_pb2.PerformRequest] = iter(self._requests.get, None)  # type: ignore[arg-type]
+        requests: Iterator[performance_pb2.PerformRequest] = iter(self._requests.get, None)
         self._call = self._client.audio_stub.Perform(requests)
 
     async def _send(self, request: performance_pb2.PerformRequest) -> None:
@@ -319,9 +319,9 @@ class HearingEnvironment:
             raise ValueError(f"the performance has {sound.environment_count} environments; it must have one")
         self.environment, self.sound, self.contacts_of = environment, sound, contacts_of
         step_s, rate_hz = sound._settings.step_s, sound.sample_rate_hz
-        self.observation_space = {
-            "state": getattr(environment, "observation_space", None),
-            "sound": {"shape": (sound.channel_count, round(step_s * rate_hz)), "dtype": numpy.float32}}
+        self._shape = (sound.channel_count, round(step_s * rate_hz))
+        self.observation_space = {"state": getattr(environment, "observation_space", None),
+                                  "sound": {"shape": self._shape, "dtype": numpy.float32}}
         self.action_space = getattr(environment, "action_space", None)
 
     def reset(self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
@@ -329,8 +329,7 @@ class HearingEnvironment:
         """Resets the environment and its sound. The sound of the first observation is silence."""
         state, info = self.environment.reset(seed=seed, options=options)
         self.sound.reset()
-        shape = self.observation_space["sound"]["shape"]
-        return {"state": state, "sound": numpy.zeros(shape, numpy.float32)}, info
+        return {"state": state, "sound": numpy.zeros(self._shape, numpy.float32)}, info
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Takes a step, and lets its contacts sound."""
