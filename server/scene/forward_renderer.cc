@@ -24,7 +24,7 @@ constexpr size_t kPendingPerEvent = 4;
 constexpr double kLongestLeadS = 0.075;
 /// Memory that an object takes beside its model, and for each of its modes that sound.
 constexpr size_t kObjectBytes = size_t{40} << 10U;
-constexpr size_t kModeBytes = 64;
+constexpr size_t kModeBytes = 80;
 
 MixerSettings SettingsOf(const OfflineSettings& settings, RenderThreads& threads) {
   // Offline blocks have no deadline, so a block takes all its events.

@@ -132,6 +132,18 @@ absl::StatusOr<SoundingModes> SelectModes(const ModalModel& model,
   return NoModeInBand(model, properties.material, band);
 }
 
+std::shared_ptr<const YieldingModes> YieldingModesOf(const SoundingModes& sounding) {
+  auto yielding = std::make_shared<YieldingModes>();
+  yielding->shape_scale = sounding.shape_scale;
+  yielding->modes.reserve(sounding.modes.size());
+  for (const SoundingMode& mode : sounding.modes) {
+    yielding->modes.push_back({.column = mode.column,
+                               .damped_rad_per_s = static_cast<float>(mode.damped_rad_per_s),
+                               .decay_rate_per_s = static_cast<float>(mode.decay_rate_per_s)});
+  }
+  return yielding;
+}
+
 double LowestHz(const std::vector<SoundingMode>& modes) {
   return modes.empty() ? 0 : modes.front().natural_frequency_hz;
 }
@@ -189,7 +201,7 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
   const double top_hz = std::min(band.highest_hz, settings.sample_rate_hz / 2);
   return SoundingObject{.body = std::move(body),
                         .properties = properties,
-                        .sounding = std::make_shared<const SoundingModes>(sounding),
+                        .yielding = YieldingModesOf(sounding),
                         .mode_count = static_cast<uint32_t>(sounding.modes.size()),
                         .lowest_frequency_hz = LowestHz(sounding.modes),
                         .highest_frequency_hz = HighestHz(sounding.modes),

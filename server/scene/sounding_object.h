@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "server/base/pose.h"
@@ -38,12 +39,23 @@ struct ObjectProperties {
   RadiationModel radiation = RadiationModel::kDefault;
 };
 
+/// The modes of an object, by which its surface yields to a blow.
+struct YieldingModes {
+  struct Mode {
+    uint32_t column = 0;  ///< in the modal model
+    float damped_rad_per_s = 0;
+    float decay_rate_per_s = 0;
+  };
+  std::vector<Mode> modes;
+  double shape_scale = 1;  ///< phi = shape_scale * phi of the model
+};
+
 /// An object that sounds. Its oscillator bank belongs to a mixer.
 struct SoundingObject {
   std::shared_ptr<const SoundingBody> body;
   ObjectProperties properties;
   /// The modes that sound; none may, see `clicks`.
-  std::shared_ptr<const SoundingModes> sounding;
+  std::shared_ptr<const YieldingModes> yielding;
   uint32_t mode_count = 0;          ///< number of modes that sound
   double lowest_frequency_hz = 0;   ///< lowest natural frequency of those modes; zero if none
   double highest_frequency_hz = 0;  ///< highest natural frequency of those modes

@@ -28,12 +28,12 @@ void LetYield(const SoundingObject& object, const Collision& collision, SurfaceI
                                     blow.impulse_newton_seconds[2]);
   if (!(collision.reduced_mass_kg > 0) || !(impulse > 0) || blow.pulse.gaussian()) return;
   std::vector<StruckMode> modes;
-  modes.reserve(object.sounding->modes.size());
-  for (const SoundingMode& mode : object.sounding->modes) {
+  modes.reserve(object.yielding->modes.size());
+  for (const YieldingModes::Mode& mode : object.yielding->modes) {
     const double shape =
-        object.sounding->shape_scale / impulse * ShapeAlong(*object.body->model, mode.column, blow);
-    modes.push_back({.damped_rad_per_s = mode.damped_rad_per_s,
-                     .decay_rate_per_s = mode.decay_rate_per_s,
+        object.yielding->shape_scale / impulse * ShapeAlong(*object.body->model, mode.column, blow);
+    modes.push_back({.damped_rad_per_s = double{mode.damped_rad_per_s},
+                     .decay_rate_per_s = double{mode.decay_rate_per_s},
                      .shape_squared_per_kg = shape * shape});
   }
   blow.gains = YieldingGains(modes, collision, impulse, double{blow.pulse.duration_s()});
