@@ -34,8 +34,8 @@ struct ErrorEstimate {
 ///
 /// At a re-entrant edge of the body the stress is singular, and functions of a higher order take up
 /// a smaller part of the error than elsewhere. The weight w_b compensates for this. Each corner of
-/// b has a weight by PlaceWeights(), which also compensates for the locking of flat walls, and w_b is
-/// the largest of these weights.
+/// b has a weight by PlaceWeights(), which also compensates for the locking of flat walls, and w_b
+/// is the largest of these weights.
 ///
 /// The estimate detects the locking of thin walls, which estimates by averaged stresses do not. C
 /// is fitted to a bar, a block, a plate and a tube so that the estimate is rarely too small for

@@ -22,12 +22,12 @@ namespace carillon::precompute {
 /// rises with the angle by which the boundary turns within the length of two elements' edges. This
 /// dependence was fitted to an angle with a fillet.
 ///
-/// Quadratic elements that are much wider than a flat wall is thick lock in bending. A correction by
-/// functions of the next order, with the mode's own displacement left as it is, is then only a part
-/// of the error, the smaller the flatter the elements are: about a half at a width of four
+/// Quadratic elements that are much wider than a flat wall is thick lock in bending. A correction
+/// by functions of the next order, with the mode's own displacement left as it is, is then only a
+/// part of the error, the smaller the flatter the elements are: about a half at a width of four
 /// thicknesses and a quarter at eight. The weight is a power of the least aspect (longest edge over
-/// least height) of the elements at the node. It was fitted to discs. Facets of curved walls need no
-/// such weight, because their edges are bent.
+/// least height) of the elements at the node. It was fitted to discs. Facets of curved walls need
+/// no such weight, because their edges are bent.
 ///
 /// The weight of a node is the largest of its weights by edges, by fillets and by flat walls. It is
 /// 1 inside a solid, on its plane and convex parts, and at mid-side nodes.

@@ -33,8 +33,8 @@ struct Written {
     RenderedFile file(form);
     const std::span<const float> all(sound);
     for (size_t at = 0; at < all.size(); at += block) {
-      const auto samples = all.subspan(at, std::min(block, all.size() - at));
-      EXPECT_TRUE(file.Take({.sample_rate_hz = 48000, .channel_count = 1, .samples = samples}));
+      const auto part = all.subspan(at, std::min(block, all.size() - at));
+      EXPECT_TRUE(file.Take({.sample_rate_hz = 48000, .channel_count = 1, .samples = part}));
     }
     EXPECT_TRUE(file.Finish().ok());
     cut = file.is_cut();

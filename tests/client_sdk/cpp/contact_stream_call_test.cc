@@ -125,7 +125,8 @@ TEST_F(ContactStreamCallTest, AMessageIsNoLargerThanItsFirstStepOr64KiB) {
 
 TEST_F(ContactStreamCallTest, WarnsOfTheStepsThatItDropped) {
   MakeStepsWait();
-  // gRPC may still take a message or two, so that the number of steps that fill the queue is not known.
+  // gRPC may still take a message or two, so that the number of steps that fill the queue is not
+  // known.
   while (stream_->DroppedStepCount() < 100 && sent_count_ < 100000) Send(100, 1);
   service_.may_read.Notify();
   const auto report = stream_->Finish();
