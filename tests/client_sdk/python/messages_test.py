@@ -350,7 +350,8 @@ class ShortFormsTest(MessagesTest):
 class AioTest(unittest.TestCase):
     def test_every_call_has_its_like_in_asyncio_and_all_that_asks_the_daemon_is_a_coroutine(self):
         aio = carillon.aio
-        at_once = {"stream", "recording", "recording_contacts", "cancel", "in_turn", "forget", "step", "send"}
+        at_once = {"stream", "recording", "recording_contacts", "perform", "cancel", "in_turn", "forget", "step",
+                   "send"}
         for kind, plain in ((aio.AsyncClient, carillon.Client), (aio.AsyncScene, carillon.Scene),
                             (aio.AsyncContactStream, carillon.ContactStream), (aio.AsyncModel, carillon.Model),
                             (aio.AsyncJob, carillon.Job), (aio.AsyncObject, carillon.SoundingObject),
