@@ -10,7 +10,7 @@ namespace carillon::motion {
 FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
                            const ContactSearch& search, const ContactProblem& problem);
 
-/// Sets how much the blows differ from those of other solutions.
-void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double within_s);
+/// Sets how much the blows differ from those of other solutions within a frame of them.
+void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double frame_s);
 
 }  // namespace carillon::motion

@@ -49,28 +49,29 @@ BodyMotion::BodyMotion(const MovingBody& body, const Motion& motion)
   for (size_t k = 0; k < intervals; ++k) Shoot(k);
 }
 
-Vector BodyMotion::Guess(size_t k) const {
-  const Turn middle = places_[k].orientation.slerp(0.5, places_[k + 1].orientation);
-  return middle * (inertia_.tensor_kg_m2 * (middle.conjugate() * turn_[k])) / frame_s_;
+Vector BodyMotion::Guess(size_t interval) const {
+  const Turn middle = places_[interval].orientation.slerp(0.5, places_[interval + 1].orientation);
+  return middle * (inertia_.tensor_kg_m2 * (middle.conjugate() * turn_[interval])) / frame_s_;
 }
 
-std::vector<TorqueImpulse> BodyMotion::TorquesOf(size_t k) const {
+std::vector<TorqueImpulse> BodyMotion::TorquesOf(size_t interval) const {
   std::vector<TorqueImpulse> torques;
-  for (const BodyImpulse& impulse : impulses_[k]) {
+  for (const BodyImpulse& impulse : impulses_[interval]) {
     torques.push_back({impulse.time_s, impulse.torque});
   }
   return torques;
 }
 
-void BodyMotion::Shoot(size_t k) {
-  const std::vector<TorqueImpulse> torques = TorquesOf(k);
-  Vector guess = Guess(k);
+void BodyMotion::Shoot(size_t interval) {
+  const std::vector<TorqueImpulse> torques = TorquesOf(interval);
+  Vector guess = Guess(interval);
   for (const TorqueImpulse& torque : torques) {
     guess -= (1 - torque.time_s / frame_s_) * torque.change;
   }
-  start_[k] = end_[k] = ShootMomentum(inertia_, places_[k].orientation, places_[k + 1].orientation,
-                                      frame_s_, torques, guess);
-  for (const TorqueImpulse& torque : torques) end_[k] += torque.change;
+  start_[interval] = end_[interval] =
+      ShootMomentum(inertia_, places_[interval].orientation, places_[interval + 1].orientation,
+                    frame_s_, torques, guess);
+  for (const TorqueImpulse& torque : torques) end_[interval] += torque.change;
 }
 
 void BodyMotion::Know(const std::vector<std::vector<BodyImpulse>>& impulses,
@@ -84,18 +85,18 @@ void BodyMotion::Know(const std::vector<std::vector<BodyImpulse>>& impulses,
   }
 }
 
-Vector BodyMotion::Impulse(size_t k) const {
+Vector BodyMotion::Impulse(size_t node) const {
   const Vector jump =
-      places_[k + 1].position_m - 2 * places_[k].position_m + places_[k - 1].position_m;
+      places_[node + 1].position_m - 2 * places_[node].position_m + places_[node - 1].position_m;
   return mass_kg_ * (jump / frame_s_ - gravity_ * frame_s_);
 }
 
-Vector BodyMotion::Torque(size_t k) const {
-  Vector torque = start_[k] - end_[k - 1];
-  for (const BodyImpulse& impulse : impulses_[k]) {
+Vector BodyMotion::Torque(size_t node) const {
+  Vector torque = start_[node] - end_[node - 1];
+  for (const BodyImpulse& impulse : impulses_[node]) {
     torque += (1 - impulse.time_s / frame_s_) * impulse.torque;
   }
-  for (const BodyImpulse& impulse : impulses_[k - 1]) {
+  for (const BodyImpulse& impulse : impulses_[node - 1]) {
     torque += impulse.time_s / frame_s_ * impulse.torque;
   }
   return torque;
@@ -108,51 +109,57 @@ Matrix BodyMotion::InverseInertia(size_t frame) const {
 
 BodyPose BodyMotion::AtFrame(size_t frame) const { return places_[moves() ? frame : 0]; }
 
-BodyPose BodyMotion::At(size_t k, double time_s, Path path) const {
+BodyPose BodyMotion::At(size_t interval, double time_s, Path path) const {
   if (!moves()) return places_[0];
-  const BodyPose &from = places_[k], &to = places_[k + 1];
+  const BodyPose &from = places_[interval], &to = places_[interval + 1];
   const double h = frame_s_, share = time_s / h;
   if (!balanced() || path == Path::kBetween) {
-    return {from.position_m + share * (to.position_m - from.position_m),
-            Turn(Eigen::AngleAxisd(share * turn_[k].norm(), turn_[k].norm() > 1e-12
-                                                                ? Vector(turn_[k].normalized())
-                                                                : Vector(Vector::UnitX()))) *
-                from.orientation};
+    return {
+        from.position_m + share * (to.position_m - from.position_m),
+        Turn(Eigen::AngleAxisd(share * turn_[interval].norm(),
+                               turn_[interval].norm() > 1e-12 ? Vector(turn_[interval].normalized())
+                                                              : Vector(Vector::UnitX()))) *
+            from.orientation};
   }
-  if (path == Path::kBefore && k > 0) {
-    const Vector velocity = (from.position_m - places_[k - 1].position_m) / h + gravity_ * h / 2;
+  if (path == Path::kBefore && interval > 0) {
+    const Vector velocity =
+        (from.position_m - places_[interval - 1].position_m) / h + gravity_ * h / 2;
     return {from.position_m + velocity * time_s + gravity_ * time_s * time_s / 2,
-            TurnFreely(inertia_, from.orientation, end_[k - 1], time_s)};
+            TurnFreely(inertia_, from.orientation, end_[interval - 1], time_s)};
   }
-  if (path == Path::kAfter && k + 2 < places_.size()) {
+  if (path == Path::kAfter && interval + 2 < places_.size()) {
     const double back = time_s - h;
-    const Vector velocity = (places_[k + 2].position_m - to.position_m) / h - gravity_ * h / 2;
+    const Vector velocity =
+        (places_[interval + 2].position_m - to.position_m) / h - gravity_ * h / 2;
     return {to.position_m + velocity * back + gravity_ * back * back / 2,
-            TurnFreely(inertia_, to.orientation, start_[k + 1], back)};
+            TurnFreely(inertia_, to.orientation, start_[interval + 1], back)};
   }
-  return Known(k, time_s);
+  return Known(interval, time_s);
 }
 
-BodyPose BodyMotion::Known(size_t k, double time_s) const {
+BodyPose BodyMotion::Known(size_t interval, double time_s) const {
   const double h = frame_s_;
-  const Vector a0 = gravity_ + forces_[k] / mass_kg_, a1 = gravity_ + forces_[k + 1] / mass_kg_;
-  Vector velocity = (places_[k + 1].position_m - places_[k].position_m) / h - h * (a0 / 3 + a1 / 6);
+  const Vector a0 = gravity_ + forces_[interval] / mass_kg_,
+               a1 = gravity_ + forces_[interval + 1] / mass_kg_;
+  Vector velocity =
+      (places_[interval + 1].position_m - places_[interval].position_m) / h - h * (a0 / 3 + a1 / 6);
   Vector bent = Vector::Zero();
-  for (const BodyImpulse& impulse : impulses_[k]) {
+  for (const BodyImpulse& impulse : impulses_[interval]) {
     velocity -= (1 - impulse.time_s / h) * impulse.impulse / mass_kg_;
     bent += std::max(0.0, time_s - impulse.time_s) * impulse.impulse / mass_kg_;
   }
-  Vector momentum = start_[k];
-  const Turn turn = TurnThrough(inertia_, places_[k].orientation, time_s, TorquesOf(k), momentum);
-  return {places_[k].position_m + velocity * time_s + bent + a0 * time_s * time_s / 2 +
+  Vector momentum = start_[interval];
+  const Turn turn =
+      TurnThrough(inertia_, places_[interval].orientation, time_s, TorquesOf(interval), momentum);
+  return {places_[interval].position_m + velocity * time_s + bent + a0 * time_s * time_s / 2 +
               (a1 - a0) * time_s * time_s * time_s / (6 * h),
           turn};
 }
 
-double BodyMotion::Speed(size_t k) const {
+double BodyMotion::Speed(size_t interval) const {
   if (!moves()) return 0;
-  return ((places_[k + 1].position_m - places_[k].position_m).norm() +
-          radius_m_ * turn_[k].norm()) /
+  return ((places_[interval + 1].position_m - places_[interval].position_m).norm() +
+          radius_m_ * turn_[interval].norm()) /
          frame_s_;
 }
 

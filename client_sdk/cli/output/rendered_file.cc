@@ -50,8 +50,8 @@ size_t RenderedFile::Cut(bool last) {
   if (!cut_) {
     // The gain falls as half a period of a cosine from the first frame of the fade to its end.
     for (uint64_t i = unfaded; i < room; ++i) {
-      const double part =
-          static_cast<double>((i - unfaded) / channels) / static_cast<double>(fade / channels);
+      const uint64_t faded_frames = (i - unfaded) / channels, fade_frames = fade / channels;
+      const double part = static_cast<double>(faded_frames) / static_cast<double>(fade_frames);
       samples_[i] *= static_cast<float>(0.5 + 0.5 * std::cos(std::numbers::pi * part));
     }
   }

@@ -351,8 +351,9 @@ void GltfDocument::ApplySparse(const Json& accessor, size_t width,
   ReadElements({at, count, 1, index_size}, index_type, false, elements);
   std::vector<Number> values(count * width);
   ReadElements({bytes, count, width, size}, type, accessor.value("normalized", false), values);
+  const size_t element_count = numbers.size() / width;
   for (size_t i = 0; i < count; ++i) {
-    if (!(elements[i] >= 0 && elements[i] < static_cast<double>(numbers.size() / width))) {
+    if (!(elements[i] >= 0 && elements[i] < static_cast<double>(element_count))) {
       throw GltfFault("a sparse accessor changes an element that it does not have");
     }
     std::copy_n(&values[i * width], width, &numbers[static_cast<size_t>(elements[i]) * width]);

@@ -116,13 +116,13 @@ TEST_F(LocalExecutorTest, RunsTheWorkerNicedAndNoisyStreamsHarmless) {
   const Outcome outcome =
       RunScript("nice >\"$out\"; cat; head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2");
   EXPECT_EQ(outcome.verdict, Verdict::kOk) << outcome.error.message();
-  EXPECT_EQ(run_.model, "10\n");
+  EXPECT_EQ(run_.model, "5\n");
 }
 
 TEST_F(LocalExecutorTest, RunsATransferAtALowerPriorityThanADecomposition) {
   radiates_ = true;
   EXPECT_EQ(RunScript("nice >\"$out\"").verdict, Verdict::kOk);
-  EXPECT_EQ(run_.model, "19\n");
+  EXPECT_EQ(run_.model, "10\n");
 }
 
 TEST_F(LocalExecutorTest, KeepsAndRevealsNothingOfAMesh) {
