@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/commands/material_figures.h"
 
+#include <google/protobuf/text_format.h>
+
+#include <fstream>
+#include <iterator>
+
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/loss_factor.h"
@@ -9,10 +14,31 @@
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
+namespace {
+
+absl::StatusOr<v1::Material> ReadMaterial(const std::string& path) {
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(path, " cannot be read: see its name and rights"));
+  }
+  v1::Material material;
+  if (google::protobuf::TextFormat::ParseFromString(text, &material)) return material;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrCat(path,
+                              " is not a Material as text: give a file that carillon material "
+                              "fit --out wrote, or lines such as young_pa: 70e9"));
+}
+
+}  // namespace
 
 absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
   v1::Material material;
-  material.set_preset(figures.preset);
+  if (!figures.file.empty()) {
+    ASSIGN_OR_RETURN(material, ReadMaterial(figures.file));
+  }
+  if (!figures.preset.empty()) material.set_preset(figures.preset);
   if (figures.young_pa) material.set_young_pa(*figures.young_pa);
   if (figures.poisson_ratio) material.set_poisson_ratio(*figures.poisson_ratio);
   if (figures.density_kg_per_m3) material.set_density_kg_per_m3(*figures.density_kg_per_m3);

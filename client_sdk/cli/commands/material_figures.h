@@ -13,6 +13,7 @@ namespace carillon::cli {
 /// named material, or figures alone.
 struct MaterialFigures {
   std::string preset;
+  std::string file;  ///< a Material as text, which the other figures override; empty: none
   std::optional<double> young_pa;
   std::optional<double> poisson_ratio;
   std::optional<double> lame_lambda_pa;
@@ -26,7 +27,8 @@ struct MaterialFigures {
 /// Converts the figures to the message of the contract. Lamé's constants become
 /// E = mu (3 lambda + 2 mu)/(lambda + mu) and nu = lambda/(2 (lambda + mu)). Errors:
 /// InvalidArgument (INVALID_MATERIAL) if only one of Lamé's constants is given, or if they are
-/// given together with Young's modulus or Poisson's ratio.
+/// given together with Young's modulus or Poisson's ratio, or if the file is no Material; NotFound
+/// (FILE_NOT_FOUND).
 absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures);
 
 /// Returns the name of a material, with the figures that override its own, or the figures alone.

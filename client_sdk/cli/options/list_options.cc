@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/options/fit_options.h"
 #include "client_sdk/cli/options/sound_options.h"
 #include "client_sdk/cli/options/value_options.h"
 #include "client_sdk/job_runs/job_run_client.h"
@@ -136,9 +137,11 @@ void AddJob(CLI::App& app, Program& program) {
 void AddMaterials(CLI::App& app, Program& program) {
   auto name = std::make_shared<std::string>();
   CLI::App& material = *app.add_subcommand(
-      "material", "List the named materials, or show the figures of one and their source");
+      "material", "List the named materials, show the figures of one, or find one by recordings");
   material.add_option("material", *name, "The name of a material [a list of all]");
-  material.callback([&program, name] {
+  AddMaterialFit(material, program);
+  material.callback([&program, &material, name] {
+    if (!material.get_subcommands().empty()) return;
     program.command = [&program, name] {
       return name->empty() ? ListMaterials(*program.Daemon(), program.json)
                            : ShowMaterial(*program.Daemon(), *name, program.json);

@@ -18,6 +18,10 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
   app.add_option("--material", material.preset,
                  "A named material; the figures below override its own")
       ->group("Material");
+  app.add_option("--material-file", material.file,
+                 "A file with a material as text, as carillon material fit writes it; the figures "
+                 "below override it")
+      ->group("Material");
   AddFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
   AddFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
   AddFigure(app, "--lame-lambda", material.lame_lambda_pa, "Lame's first constant, Pa");

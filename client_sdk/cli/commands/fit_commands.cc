@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/cli/commands/fit_commands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "client_sdk/cli/commands/find_model.h"
+#include "client_sdk/cli/commands/measured_modes.h"
+#include "client_sdk/cli/output/output.h"
+#include "client_sdk/cli/output/wave_file.h"
+#include "client_sdk/fit/residual.h"
+#include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/status_macros.h"
+
+namespace carillon::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A body, and its sound if it was given as recordings.
+struct Source {
+  fit::FittedBody body;
+  Extracted extracted;
+  std::vector<std::string> files;
+};
+
+absl::StatusOr<fit::ModelLines> LinesOf(const v1::ModalModelSummary& model) {
+  const v1::ModalModelHeader& header = model.header();
+  if (header.poisson_slopes_size() != model.eigenvalues_size()) {
+    return Refusal(
+        absl::StatusCode::kFailedPrecondition, "MODEL_LACKS_SLOPES",
+        absl::StrCat(
+            "the model \"", model.label(),
+            "\" was made before models said how their frequencies change with Poisson's ratio, "
+            "or elsewhere: delete it (carillon model delete), and create it again of its mesh"));
+  }
+  return fit::ModelLines{
+      .poisson_ratio = header.settings().poisson_ratio(),
+      .eigenvalues = {model.eigenvalues().begin(), model.eigenvalues().end()},
+      .errors = {header.estimated_errors().begin(), header.estimated_errors().end()},
+      .slopes = {header.poisson_slopes().begin(), header.poisson_slopes().end()},
+      .complete_to_eigenvalue = header.complete_to_eigenvalue()};
+}
+
+/// The decay rate of each mode by radiation, for unit density and a speed sqrt(E/rho): rho_air
+/// Lambda c^2 I/(2 c_air). Empty if no transfer of the model is for about that speed.
+std::vector<double> RadiationOf(const v1::ModalModelSummary& model, double speed_m_per_s) {
+  constexpr double kFarthest = 0.05;  // as the daemon has it
+  const v1::TransferSummary* nearest = nullptr;
+  double least = kFarthest;
+  for (const v1::TransferSummary& transfer : model.transfers()) {
+    const v1::TransferHeader& header = transfer.header();
+    const double apart =
+        std::abs(std::log(speed_m_per_s / (header.speed_ratio() * header.sound_speed_m_per_s())));
+    if (apart > least || transfer.power_integrals_size() != model.eigenvalues_size()) continue;
+    nearest = &transfer, least = apart;
+  }
+  std::vector<double> decays;
+  if (nearest == nullptr) return decays;
+  const double air =
+      nearest->header().air_density_kg_per_m3() / (2 * nearest->header().sound_speed_m_per_s());
+  for (int m = 0; m < model.eigenvalues_size(); ++m) {
+    decays.push_back(air * model.eigenvalues(m) * speed_m_per_s * speed_m_per_s *
+                     double{nearest->power_integrals(m)});
+  }
+  return decays;
+}
+
+absl::StatusOr<Source> ReadSource(const std::vector<std::string>& files) {
+  Source source{.body = {}, .extracted = {}, .files = files};
+  std::vector<std::string> recordings;
+  for (const std::string& file : files) {
+    if (!absl::EndsWithIgnoreCase(file, ".csv")) {
+      recordings.push_back(file);
+      continue;
+    }
+    ASSIGN_OR_RETURN(const auto modes, ReadModes(file));
+    source.body.modes.insert(source.body.modes.end(), modes.begin(), modes.end());
+  }
+  if (!recordings.empty()) {
+    ASSIGN_OR_RETURN(source.extracted, ExtractFrom(recordings));
+    const auto& modes = source.extracted.modes;
+    RETURN_IF_ERROR(fit::CheckModes(source.extracted.rings, modes));
+    source.body.modes.insert(source.body.modes.end(), modes.begin(), modes.end());
+  }
+  std::ranges::sort(source.body.modes, {}, &fit::MeasuredMode::frequency_hz);
+  return source;
+}
+
+/// The model of a body, with a transfer for about the speed found if there was one.
+absl::StatusOr<v1::ModalModelSummary> ModelOf(const client::Client& daemon,
+                                              const std::string& text) {
+  ASSIGN_OR_RETURN(const std::string name, FindModel(daemon, text));
+  return daemon.GetModalModel(name);
+}
+
+v1::Material MaterialOf(const fit::MaterialFit& fit) {
+  const auto rounded = [](double value, int digits) {
+    const double step = std::pow(10, std::floor(std::log10(value)) - digits + 1);
+    return std::round(value / step) * step;
+  };
+  v1::Material material;
+  material.set_young_pa(rounded(fit.young_pa, 6));
+  material.set_poisson_ratio(std::round(fit.poisson_ratio * 1e4) / 1e4);
+  material.set_density_kg_per_m3(rounded(fit.density_kg_per_m3, 6));
+  if (fit.laws.empty()) return material;
+  const fit::DampingLaw& law = fit.laws[0];
+  material.set_alpha1_s(law.alpha1_s);
+  material.set_alpha2_per_s(law.alpha2_per_s);
+  SetLossFactor(law.loss_factor, material);
+  return material;
+}
+
+std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+  std::string text = "# A material that carillon material fit found.\n";
+  for (const Source& source : sources) {
+    absl::StrAppend(&text, "# Body ", source.body.name, ": ", absl::StrJoin(source.files, ", "),
+                    "\n");
+  }
+  absl::StrAppendFormat(&text,
+                        "# E/rho %.5g m^2/s^2 +- %.2g %%, Poisson's ratio +- %.2g (two standard "
+                        "errors); %d lines matched, %.2g %% apart,\n"
+                        "# the next best match %.1f nepers behind. A wrong size of the mesh hides "
+                        "in E: one percent in size is two in E.\n",
+                        fit.young_over_density, 200 * fit.young_over_density_error,
+                        2 * fit.poisson_error, fit.matched_count, 100 * fit.rms, fit.log_odds);
+  if (fit.laws.empty()) {
+    absl::StrAppend(&text, "# No decay was measured: give the damping beside this file.\n");
+  } else {
+    absl::StrAppendFormat(&text,
+                          "# Damping: %s, within a factor of %.2f of half of the decay rates.\n",
+                          fit.laws[0].Name(), fit.laws[0].missed_by);
+  }
+  return absl::StrCat(text, MaterialOf(fit).DebugString());
+}
+
+Json ToJson(const fit::MeasuredMode& mode) {
+  return {{"frequency_hz", mode.frequency_hz}, {"frequency_error_hz", mode.frequency_error_hz},
+          {"decay_per_s", mode.decay_per_s},   {"decay_error_per_s", mode.decay_error_per_s},
+          {"level_db", mode.level_db},         {"signal_to_noise_db", mode.signal_to_noise_db}};
+}
+
+Json ToJson(const fit::DampingLaw& law) {
+  Json points = Json::array();
+  for (const LossFactorPoint& point : law.loss_factor) {
+    points.push_back({{"frequency_hz", point.frequency_hz}, {"loss_factor", point.loss_factor}});
+  }
+  return {{"name", law.Name()},    {"alpha1_s", law.alpha1_s},   {"alpha2_per_s", law.alpha2_per_s},
+          {"loss_factor", points}, {"missed_by", law.missed_by}, {"criterion", law.criterion}};
+}
+
+Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
+  Json json = ToJson(line.measured);
+  json["body"] = sources[line.body].body.name;
+  json["near_room"] = line.measured.near_room;
+  if (!line.mode) return json;
+  json["mode"] = *line.mode + 1;
+  json["model_hz"] = line.model_hz;
+  json["radiation_per_s"] = line.radiation_per_s;
+  json["law_per_s"] = line.law_per_s;
+  return json;
+}
+
+Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+  Json lines = Json::array(), candidates = Json::array(), laws = Json::array();
+  for (const fit::FittedLine& line : fit.lines) lines.push_back(ToJson(line, sources));
+  for (const fit::DampingLaw& law : fit.laws) laws.push_back(ToJson(law));
+  for (const fit::Match& match : fit.candidates) {
+    candidates.push_back({{"young_over_density", match.speed_m_per_s * match.speed_m_per_s},
+                          {"poisson_ratio", match.poisson_ratio},
+                          {"matched", match.lines.size()},
+                          {"rms", match.rms},
+                          {"score", match.score}});
+  }
+  return {{"young_over_density", fit.young_over_density},
+          {"young_over_density_error", fit.young_over_density_error},
+          {"young_pa", fit.young_pa},
+          {"density_kg_per_m3", fit.density_kg_per_m3},
+          {"poisson_ratio", fit.poisson_ratio},
+          {"poisson_error", fit.poisson_error},
+          {"matched", fit.matched_count},
+          {"rms", fit.rms},
+          {"log_odds", fit.log_odds},
+          {"laws", laws},
+          {"lines", lines},
+          {"candidates", candidates}};
+}
+
+/// The reverberation time, or null.
+Json RoomT60(const fit::Room& room) {
+  return room.share == 0 ? Json() : Json(std::log(1000) / room.decay_per_s);
+}
+
+/// Says in which room the recordings were made, if it was told apart.
+void PrintRoom(const fit::Room& room) {
+  if (room.share == 0) {
+    absl::PrintF("room        none that could be told apart\n");
+    return;
+  }
+  absl::PrintF("room        T60 %.2g s, taken off; modes with * decay at about its rate\n",
+               std::log(1000) / room.decay_per_s);
+}
+
+void PrintModes(const std::vector<fit::MeasuredMode>& modes) {
+  absl::PrintF("%12s %9s %11s %9s %8s %9s %8s\n", "Hz", "+- Hz", "decay 1/s", "+- 1/s", "T60 s",
+               "level dB", "S/N dB");
+  for (const fit::MeasuredMode& mode : modes) {
+    const double t60 = mode.decay_per_s > 0 ? std::log(1000) / mode.decay_per_s : HUGE_VAL;
+    absl::PrintF("%12.3f %9.3f %11.3f %9.3f %8.3g %9.1f %8.1f%s\n", mode.frequency_hz,
+                 mode.frequency_error_hz, mode.decay_per_s, mode.decay_error_per_s, t60,
+                 mode.level_db, mode.signal_to_noise_db, mode.near_room ? " *" : "");
+  }
+}
+
+void PrintLines(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+  absl::PrintF("\n%-12s %12s %11s %9s %5s %12s %8s %11s\n", "body", "measured Hz", "decay 1/s",
+               "+- 1/s", "mode", "model Hz", "apart %", "model 1/s");
+  for (const fit::FittedLine& line : fit.lines) {
+    absl::PrintF("%-12s %12.3f %11.3f %9.3f", sources[line.body].body.name,
+                 line.measured.frequency_hz, line.measured.decay_per_s,
+                 line.measured.decay_error_per_s);
+    if (line.mode) {
+      absl::PrintF(" %5d %12.3f %8.2f %11.3f", *line.mode + 1, line.model_hz,
+                   100 * std::log(line.measured.frequency_hz / line.model_hz), line.law_per_s);
+    }
+    absl::PrintF("%s\n", line.measured.near_room ? " *" : "");
+  }
+}
+
+void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+  absl::PrintF("%d of %s matched, %.2g %% apart; the next best match is %.1f nepers behind\n",
+               fit.matched_count, Counted(fit.lines.size(), "line"), 100 * fit.rms, fit.log_odds);
+  absl::PrintF("E/rho       %.5g m^2/s^2 +- %.2g %% (two standard errors)\n",
+               fit.young_over_density, 200 * fit.young_over_density_error);
+  absl::PrintF("E           %.5g GPa at %.5g kg/m^3\n", fit.young_pa / 1e9, fit.density_kg_per_m3);
+  absl::PrintF("Poisson     %.4f +- %.4f\n", fit.poisson_ratio, 2 * fit.poisson_error);
+  for (size_t k = 0; k < fit.laws.size(); ++k) {
+    const fit::DampingLaw& law = fit.laws[k];
+    std::string figures;
+    for (const LossFactorPoint& point : law.loss_factor) {
+      absl::StrAppendFormat(&figures, " %.0f:%.3g", point.frequency_hz, point.loss_factor);
+    }
+    if (law.kind == fit::DampingKind::kRayleigh) {
+      figures = absl::StrFormat(" alpha1 %.3g s, alpha2 %.3g 1/s", law.alpha1_s, law.alpha2_per_s);
+    }
+    absl::PrintF("%-11s %s (%s, misses rates by x%.2f)\n", k == 0 ? "damping" : "  or",
+                 absl::StripAsciiWhitespace(figures), law.Name(), law.missed_by);
+  }
+  for (const Source& source : sources) {
+    if (!source.extracted.rings.empty()) PrintRoom(source.extracted.room);
+  }
+  PrintLines(fit, sources);
+  absl::PrintF(
+      "\nA wrong size of the mesh hides in E and cannot be seen: one percent in size is two in "
+      "E.\n");
+}
+
+absl::Status WriteResidual(const std::string& path, const Source& source,
+                           const fit::MaterialFit& fit) {
+  std::vector<fit::MeasuredMode> matched;
+  for (const fit::FittedLine& line : fit.lines) {
+    if (line.body == 0 && line.mode) matched.push_back(line.measured);
+  }
+  const fit::Ring& ring = source.extracted.rings[0];
+  const fit::Residual residual = fit::ResidualOf(ring, 0, matched);
+  ASSIGN_OR_RETURN(
+      WaveFile file,
+      WaveFile::Create(path, {.sample_rate_hz = static_cast<uint32_t>(ring.sample_rate_hz)}));
+  RETURN_IF_ERROR(file.Write(residual.samples));
+  RETURN_IF_ERROR(file.Finish());
+  for (const fit::ResidualShare& share : residual.shares) {
+    absl::FPrintF(stderr, "%s: %.3g %% of the energy from %g to %g ms is no matched mode's\n", path,
+                  100 * share.share, 1000 * share.from_s, 1000 * share.to_s);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ExtractModesOf(const ExtractOptions& options, bool json) {
+  ASSIGN_OR_RETURN(const Extracted extracted, ExtractFrom(options.recordings));
+  if (extracted.modes.empty()) RETURN_IF_ERROR(fit::CheckModes(extracted.rings, extracted.modes));
+  if (!options.out.empty()) RETURN_IF_ERROR(WriteModes(options.out, extracted.modes));
+  if (json) {
+    Json modes = Json::array();
+    for (const fit::MeasuredMode& mode : extracted.modes) modes.push_back(ToJson(mode));
+    absl::PrintF("%s\n", Json{{"strikes", extracted.rings.size()},
+                              {"room_t60_s", RoomT60(extracted.room)},
+                              {"modes", modes}}
+                             .dump());
+  } else {
+    PrintModes(extracted.modes);
+    PrintRoom(extracted.room);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& options, bool json) {
+  std::vector<std::vector<std::string>> bodies = {{options.model}};
+  bodies[0].insert(bodies[0].end(), options.recordings.begin(), options.recordings.end());
+  if (!options.modes.empty()) bodies[0].push_back(options.modes);
+  bodies.insert(bodies.end(), options.others.begin(), options.others.end());
+  std::vector<Source> sources;
+  std::vector<v1::ModalModelSummary> models;
+  for (const std::vector<std::string>& words : bodies) {
+    ASSIGN_OR_RETURN(v1::ModalModelSummary model, ModelOf(daemon, words[0]));
+    ASSIGN_OR_RETURN(fit::ModelLines lines, LinesOf(model));
+    ASSIGN_OR_RETURN(Source source, ReadSource({words.begin() + 1, words.end()}));
+    source.body.name = words[0];
+    source.body.lines = std::move(lines);
+    source.body.volume_m3 = model.header().volume_m3();
+    sources.push_back(std::move(source));
+    models.push_back(std::move(model));
+  }
+  const auto fitted = [&] {
+    std::vector<fit::FittedBody> fitted_bodies;
+    for (const Source& source : sources) fitted_bodies.push_back(source.body);
+    return fit::FitMaterial(fitted_bodies, options.settings);
+  };
+  ASSIGN_OR_RETURN(fit::MaterialFit fit, fitted());
+  // What each mode radiates is known once the speed of sound is.
+  for (size_t b = 0; b < sources.size(); ++b) {
+    sources[b].body.radiation = RadiationOf(models[b], std::sqrt(fit.young_over_density));
+  }
+  ASSIGN_OR_RETURN(fit, fitted());
+  if (!options.out.empty()) RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources)));
+  if (!options.residual.empty() && !sources[0].extracted.rings.empty()) {
+    RETURN_IF_ERROR(WriteResidual(options.residual, sources[0], fit));
+  }
+  if (json) {
+    absl::PrintF("%s\n", ToJson(fit, sources).dump());
+  } else {
+    PrintFit(fit, sources);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace carillon::cli

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/fit/material_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "proto/cpp/error_reason.h"
+
+namespace carillon::fit {
+namespace {
+
+constexpr size_t kFewestModes = 5;
+constexpr double kLeastLogOdds = 4;
+constexpr double kMostRms = 0.01;
+/// Part of the measured lines that must be modes of the body.
+constexpr double kLeastMatched = 0.35;
+/// Decays that are known worse than this do not count.
+constexpr double kMostDecayError = 0.6;
+constexpr double kLeastLoudness_db = 20;
+
+absl::Status TooFew(absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "TOO_FEW_MODES",
+                 absl::StrCat(what, ", and a material needs at least ", kFewestModes,
+                              ": strike with something hard and light, such as a spoon, at three "
+                              "places, and hang the body by a thread so that it rings"));
+}
+
+absl::StatusOr<double> DensityOf(const FittedBody& first, const FitSettings& settings) {
+  if (settings.mass_kg && first.volume_m3 > 0) return *settings.mass_kg / first.volume_m3;
+  if (settings.density_kg_per_m3) return *settings.density_kg_per_m3;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrCat("frequencies give only Young's modulus divided by the density",
+                              settings.mass_kg ? ", and the volume of the model is unknown: give "
+                                                 "the density"
+                                               : ": give the mass of the body, or the density"));
+}
+
+MatchSettings SettingsOf(const FitSettings& settings, double density) {
+  MatchSettings result{.poisson_ratio = settings.poisson_ratio};
+  if (settings.least_young_pa)
+    result.least_speed_m_per_s = std::sqrt(*settings.least_young_pa / density);
+  if (settings.most_young_pa)
+    result.most_speed_m_per_s = std::sqrt(*settings.most_young_pa / density);
+  return result;
+}
+
+MeasuredBody Measured(const FittedBody& body) {
+  MeasuredBody measured{.lines = body.lines, .frequencies_hz = {}, .frequency_errors_hz = {}};
+  for (const MeasuredMode& mode : body.modes) {
+    measured.frequencies_hz.push_back(mode.frequency_hz);
+    measured.frequency_errors_hz.push_back(mode.frequency_error_hz);
+  }
+  return measured;
+}
+
+std::string Candidates(const std::vector<Match>& matches, double density) {
+  std::string text;
+  for (const Match& match : matches) {
+    if (match.score < matches[0].score - 3 * kLeastLogOdds) break;
+    const double speed = match.speed_m_per_s;
+    absl::StrAppendFormat(
+        &text,
+        "%sE %.4g GPa with Poisson's ratio %.3f (%d lines, %.2f %% apart, %.1f nepers behind)",
+        text.empty() ? "" : "; ", speed * speed * density / 1e9, match.poisson_ratio,
+        match.lines.size(), 100 * match.rms, matches[0].score - match.score);
+  }
+  return text;
+}
+
+absl::Status Check(const std::vector<Match>& matches, size_t line_count, double density) {
+  const Match& best = matches[0];
+  if (best.lines.size() < kFewestModes) {
+    return TooFew(
+        absl::StrFormat("%d of %d lines match modes of the model", best.lines.size(), line_count));
+  }
+  // The null hypothesis, by which no line is a mode of the body, is a rival, too.
+  const double second = std::max(0.0, matches.size() > 1 ? matches[1].score : 0.0);
+  if (best.score - second < kLeastLogOdds) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MATCH_AMBIGUOUS",
+        absl::StrCat(
+            "the lines fit the model in several ways: ", Candidates(matches, density),
+            ". Record strikes at more places, give the Poisson's ratio or a range of Young's "
+            "modulus if they are known, and see that the mesh is that of the body"));
+  }
+  const double matched = static_cast<double>(best.lines.size()) / static_cast<double>(line_count);
+  if (best.rms > kMostRms || matched < kLeastMatched) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_DISAGREES",
+        absl::StrFormat(
+            "%d of %d lines match, %.2f %% apart: the mesh is not that of the body. Measure "
+            "the body again, above all its thickness, and make a model of the right mesh",
+            best.lines.size(), line_count, 100 * best.rms));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<FittedLine> LinesOf(const std::vector<FittedBody>& bodies, const Match& match,
+                                double density) {
+  std::vector<FittedLine> lines;
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    const size_t first = lines.size();
+    for (const MeasuredMode& mode : bodies[b].modes)
+      lines.push_back({.body = b, .measured = mode, .mode = {}});
+    for (const MatchedLine& matched : match.lines) {
+      if (matched.body != b) continue;
+      FittedLine& line = lines[first + matched.measured];
+      line.mode = matched.mode;
+      line.model_hz =
+          match.speed_m_per_s * bodies[b].lines.HertzAtUnitSpeed(matched.mode, match.poisson_ratio);
+      if (!bodies[b].radiation.empty())
+        line.radiation_per_s = bodies[b].radiation[matched.mode] / density;
+    }
+  }
+  return lines;
+}
+
+std::vector<MeasuredDecay> DecaysOf(const std::vector<FittedLine>& lines) {
+  std::vector<MeasuredDecay> decays;
+  for (const FittedLine& line : lines) {
+    const double decay = line.measured.decay_per_s, error = line.measured.decay_error_per_s;
+    if (!line.mode || !(decay > 0) || error > kMostDecayError * decay) continue;
+    decays.push_back({.frequency_hz = line.measured.frequency_hz,
+                      .decay_per_s = decay,
+                      .relative_error = error / decay,
+                      .radiation_per_s = line.radiation_per_s});
+  }
+  return decays;
+}
+
+}  // namespace
+
+absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
+                                        const FitSettings& settings) {
+  const absl::StatusOr<double> density = DensityOf(bodies.front(), settings);
+  if (!density.ok()) return density.status();
+  std::vector<MeasuredBody> measured;
+  size_t line_count = 0;
+  for (const FittedBody& body : bodies) {
+    measured.push_back(Measured(body));
+    line_count += body.modes.size();
+  }
+  if (line_count < kFewestModes) return TooFew(absl::StrFormat("there are %d lines", line_count));
+  MaterialFit fit;
+  fit.candidates = FindMatches(measured, SettingsOf(settings, *density));
+  if (fit.candidates.empty()) return TooFew("no line matches a mode of the model");
+  if (absl::Status status = Check(fit.candidates, line_count, *density); !status.ok())
+    return status;
+  const Match& match = fit.candidates[0];
+  fit.young_over_density = match.speed_m_per_s * match.speed_m_per_s;
+  fit.young_over_density_error = 2 * match.speed_error;
+  fit.poisson_ratio = match.poisson_ratio;
+  fit.poisson_error = settings.poisson_ratio ? 0 : match.poisson_error;
+  fit.density_kg_per_m3 = *density;
+  fit.young_pa = fit.young_over_density * *density;
+  fit.rms = match.rms;
+  fit.matched_count = match.lines.size();
+  fit.log_odds =
+      match.score - std::max(0.0, fit.candidates.size() > 1 ? fit.candidates[1].score : 0.0);
+  fit.lines = LinesOf(bodies, match, *density);
+  fit.laws = FitDamping(DecaysOf(fit.lines), settings.damping);
+  for (FittedLine& line : fit.lines) {
+    if (line.mode && !fit.laws.empty()) {
+      line.law_per_s = fit.laws[0].DecayPerS(line.measured.frequency_hz) + line.radiation_per_s;
+    }
+  }
+  return fit;
+}
+
+absl::Status CheckModes(const std::vector<Ring>& rings, const std::vector<MeasuredMode>& modes) {
+  if (modes.size() >= kFewestModes) return absl::OkStatus();
+  const double loudness_db = LoudnessDb(rings);
+  if (!rings.empty() && loudness_db < kLeastLoudness_db) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "RECORDING_TOO_NOISY",
+        absl::StrFormat(
+            "the blows are only %.0f dB above the noise, and %d lines stand out: record in a "
+            "quiet room at 10 to 20 cm from the body, without a limiter or noise reduction",
+            loudness_db, modes.size()));
+  }
+  return TooFew(absl::StrFormat("%d lines stand out of %d strikes", modes.size(), rings.size()));
+}
+
+}  // namespace carillon::fit

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "client_sdk/fit/material_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/client_sdk/fit/struck_body.h"
+
+namespace carillon::fit {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kYoung_pa = 70e9, kDensity = 2500, kNu = 0.24, kLossFactor = 1e-3;
+
+/// A body of which the lowest modes were measured; its frequencies are those of another body if
+/// `scrambled`.
+FittedBody Body(size_t measured, bool scrambled = false) {
+  FittedBody body{.name = "body", .lines = IrregularLines(20), .modes = {}, .volume_m3 = 1e-4};
+  const double speed = std::sqrt(kYoung_pa / kDensity);
+  for (size_t j = 0; j < measured; ++j) {
+    double hz = speed * body.lines.HertzAtUnitSpeed(j, kNu);
+    if (scrambled) hz *= 1 + 0.04 * std::sin(5.0 * static_cast<double>(j * j + 1));
+    body.modes.push_back({.frequency_hz = hz,
+                          .frequency_error_hz = 1e-4 * hz,
+                          .decay_per_s = std::numbers::pi * hz * kLossFactor,
+                          .decay_error_per_s = 0.1});
+  }
+  return body;
+}
+
+TEST(FitMaterial, FindsTheMaterialWithTheMassOfTheBody) {
+  const auto fit = FitMaterial({Body(12)}, {.mass_kg = kDensity * 1e-4});
+  ASSERT_TRUE(fit.ok()) << fit.status();
+  EXPECT_NEAR(fit->young_pa / kYoung_pa, 1, 0.002);
+  EXPECT_NEAR(fit->poisson_ratio, kNu, 0.01);
+  EXPECT_NEAR(fit->density_kg_per_m3, kDensity, 1e-6);
+  EXPECT_EQ(fit->matched_count, 12U);
+  ASSERT_FALSE(fit->laws.empty());
+  EXPECT_NEAR(fit->laws[0].DecayPerS(2000), std::numbers::pi * 2000 * kLossFactor, 0.1);
+}
+
+TEST(FitMaterial, RefusesWithoutMassAndDensity) {
+  EXPECT_THAT(FitMaterial({Body(12)}, {}).status().ToString(), HasSubstr("INVALID_MATERIAL"));
+}
+
+TEST(FitMaterial, RefusesFewLinesAndThoseOfAnotherBody) {
+  const FitSettings settings{.density_kg_per_m3 = kDensity};
+  EXPECT_THAT(FitMaterial({Body(4)}, settings).status().ToString(), HasSubstr("TOO_FEW_MODES"));
+  EXPECT_THAT(FitMaterial({Body(12, true)}, settings).status().ToString(),
+              testing::AnyOf(HasSubstr("MATCH_AMBIGUOUS"), HasSubstr("MESH_DISAGREES"),
+                             HasSubstr("TOO_FEW_MODES")));
+}
+
+TEST(CheckModes, TellsANoisyRecordingFromASoftBlow) {
+  const std::vector<Ring> noisy = FindRings({Struck({{500, 5, 0.02}}, 0.03)});
+  EXPECT_THAT(CheckModes(noisy, {}).ToString(), HasSubstr("RECORDING_TOO_NOISY"));
+  const std::vector<Ring> soft = FindRings({Struck({{500, 5, 0.3}}, 1e-4)});
+  EXPECT_THAT(CheckModes(soft, {}).ToString(), HasSubstr("TOO_FEW_MODES"));
+}
+
+}  // namespace
+}  // namespace carillon::fit
