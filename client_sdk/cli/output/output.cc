@@ -37,8 +37,9 @@ absl::Status FlushOutput() {
 
 int Report(const absl::Status& status, bool json) {
   if (status.ok()) return kDone;
-  if (json) absl::PrintF("%s\n", ErrorJson(status));
   const v1::ErrorInfo error = ToErrorInfo(status);
+  // `health` and `doctor` have printed what does not serve, and one document of JSON is enough.
+  if (json && error.reason() != "NOT_SERVING") absl::PrintF("%s\n", ErrorJson(status));
   std::string message = error.message();
   std::ranges::replace(message, '\n', ' ');
   absl::FPrintF(stderr, "carillon: %s: %s\n", error.reason(), message);

@@ -24,7 +24,8 @@ void OpenStandardStreams();
 absl::Status FlushOutput();
 
 /// Prints "carillon: REASON: message" to stderr if `status` is an error, and with `json` to stdout
-/// what ErrorJson returns. Returns the exit code.
+/// what ErrorJson returns, except for NOT_SERVING, whose findings are printed already. Returns the
+/// exit code.
 int Report(const absl::Status& status, bool json = false);
 
 /// Returns an error as {"error": {...}} with the members of ErrorInfo: its reason, its message, its
