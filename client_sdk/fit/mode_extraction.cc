@@ -299,6 +299,7 @@ class Band {
       const Signal window = Signal(ring.samples).subspan(start);
       if (window.size() <= modes.size()) continue;
       std::vector<std::complex<double>> poles;
+      poles.reserve(modes.size());
       for (const MeasuredMode& mode : modes) {
         poles.push_back(
             std::exp(std::complex<double>(-mode.decay_per_s,

@@ -52,6 +52,7 @@ class RingFilter {
       return;
     }
     std::vector<Complex> poles;
+    poles.reserve(modes.size());
     for (const BandMode& mode : modes) poles.push_back(PoleOf(mode, ring.rate_hz));
     const auto window = Signal(ring.samples).subspan(start_, end_ - start_);
     for (const Complex& a : Amplitudes(window, poles)) power_.push_back(std::norm(a));
@@ -164,6 +165,7 @@ class BandLikelihood {
                std::span<const double> steps) const {
     double most = (*this)(modes, room);
     std::vector<double> least;
+    least.reserve(modes.size());
     for (const BandMode& mode : modes) least.push_back(kSlowest * mode.decay_per_s);
     for (const double step : steps) {
       for (size_t k = 0; k < modes.size(); ++k) {

@@ -17,6 +17,7 @@ double Median(std::vector<double> values) {
 double MedianDeviation(const std::vector<double>& values) {
   const double median = Median(values);
   std::vector<double> distances;
+  distances.reserve(values.size());
   for (const double value : values) distances.push_back(std::abs(value - median));
   return 1.4826 * Median(std::move(distances));
 }

@@ -5,7 +5,6 @@
 #include <array>
 #include <cassert>
 #include <cstddef>
-#include <ranges>
 #include <span>
 #include <utility>
 #include <vector>
@@ -122,15 +121,16 @@ const char* ListOf(v1::ContactKind kind) {
   return kind == v1::CONTACT_KIND_FORCE ? "forces" : "contacts";
 }
 
-/// Reads rows of columns, which are valid. Errors: those of KindOf.
-template <typename Rows>
-absl::Status TryReadRows(const v1::ContactColumns& columns, const Rows& rows,
+/// Reads the rows row_of(0) to row_of(row_count - 1) of columns, which are valid. Errors: those of
+/// KindOf.
+template <typename RowOf>
+absl::Status TryReadRows(const v1::ContactColumns& columns, int row_count, const RowOf& row_of,
                          const HertzContact& hertz, ContactIntake& intake) {
   ContactBatches batches(intake);
   absl::Status status = batches.Visit(columns.kind(), [&](auto& batch) {
-    auto left_count = static_cast<int>(std::ranges::size(rows));
-    for (const int row : rows) {
-      auto& contact = batch.Next(left_count--);
+    for (int i = 0; i < row_count; ++i) {
+      const int row = row_of(i);
+      auto& contact = batch.Next(row_count - i);
       ReadRow(columns, row, contact);
       contact.contact.impulse.hertz = hertz;
       contact.contact.place = PlaceIn(ListOf(columns.kind()), columns.object_size(), row);
@@ -145,7 +145,8 @@ absl::Status TryReadColumns(const v1::ContactColumns& columns, ContactIntake& in
   RETURN_IF_ERROR(KindOf(columns.kind()).status());
   RETURN_IF_ERROR(Validate(columns));
   ASSIGN_OR_RETURN(const HertzContact hertz, ToHertzContact(columns.hertz()));
-  return TryReadRows(columns, std::views::iota(0, columns.object_size()), hertz, intake);
+  const auto same = [](int row) { return row; };
+  return TryReadRows(columns, columns.object_size(), same, hertz, intake);
 }
 
 /// Reads columns of contacts, with the duration of an elastic collision where none is stated.
@@ -193,7 +194,9 @@ v1::Blow ToProto(const BlowRecord& blow) {
 
 void ReadRows(const v1::ContactColumns& columns, std::span<const int> rows,
               const HertzContact& hertz, ContactIntake& intake) {
-  [[maybe_unused]] const absl::Status read = TryReadRows(columns, rows, hertz, intake);
+  const auto row_of = [rows](int i) { return rows[static_cast<size_t>(i)]; };
+  [[maybe_unused]] const absl::Status read =
+      TryReadRows(columns, static_cast<int>(rows.size()), row_of, hertz, intake);
   assert(read.ok());
 }
 

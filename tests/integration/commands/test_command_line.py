@@ -347,7 +347,7 @@ class ListenTest(CommandLineTest):
                                "--out", self.folder / "heard.wav"], stderr=end) as listener:
             os.close(end)
             shown = os.read(terminal, 4096)
-            self.run_command("strike", self.model, "--point", "0,0.0065,0.01", "--impulse", "0,0,-0.02")
+            self.run_command("strike", self.model, "--point", "0,0.0065,0.01", "--impulse", "0,0,-0.2")
         with contextlib.suppress(OSError):  # the end of a terminal
             while more := os.read(terminal, 4096):
                 shown += more
