@@ -17,7 +17,7 @@ import sys
 ROOT = r"carillon::Mixer::Render\("
 ALLOWED = [
     r"mem(cpy|move|set|cmp)", r"_GLOBAL_OFFSET_TABLE_",
-    r"(sqrt|hypot|atan2|exp|sincos|lrint|round|floor|ceil|pow|fma)f?", r"kiss_fftri",
+    r"(sqrt|hypot|atan2|exp2?|sincos|lrint|round|floor|ceil|pow|fma)f?", r"kiss_fftri",
     # A mistake of ours or a failed assertion: the program ends, which needs no deadline.
     r"std::terminate\(\)", r"__assert_fail", r"__stack_chk_fail", r"_Unwind_Resume", r"__gxx_personality_v0",
     r"__cxa_(begin|end)_catch", r"std::__glibcxx_assert_fail.*", r"__clang_call_terminate", r"DW\.ref\..*",
