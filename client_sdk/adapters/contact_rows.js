@@ -92,8 +92,7 @@ class ContactRows {
     if (other !== undefined) {
       row.second = { object: other, point: pointOnSecond };
     } else {
-      row.striker = this.settings.striker ?? '';
-      row.striker_mass_kg = second.massKg ?? IMMOVABLE_KG;
+      row.striker = { striker: this.settings.striker ?? '', striker_mass_kg: second.massKg ?? IMMOVABLE_KG };
     }
     return [row];
   }

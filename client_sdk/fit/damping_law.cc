@@ -128,6 +128,7 @@ DampingLaw FitRayleigh(const std::vector<MeasuredDecay>& decays) {
                       .alpha2_per_s = std::exp(figures[1])};
   };
   std::vector<double> frequencies;
+  frequencies.reserve(decays.size());
   for (const MeasuredDecay& decay : decays) frequencies.push_back(decay.frequency_hz);
   const double omega = 2 * std::numbers::pi * Median(frequencies);
   const double eta = MedianLossFactor(decays);
