@@ -34,6 +34,9 @@ test('the object with the lower handle is the object of a row, however the engin
   assert.deepEqual([row.object, row.point, row.second], [2, [2, 0, 0], { object: 4, point: [1, 0, 0] }]);
   assert.deepEqual(row.impulse.map((x) => x + 0), [0, 0, -3]);
   assert.deepEqual(rows.rows({ ...contact, first: still('c'), second: still('d') }), []);
+  // The client for Node refuses rows with other names.
+  const [silent] = rows.rows({ ...contact, first: still('a'), second: { key: 'c', massKg: 2 } });
+  assert.deepEqual([silent.object, silent.striker], [4, { striker: '', striker_mass_kg: 2 }]);
 });
 
 test('velocities alone give the impulse of a collision', () => {
