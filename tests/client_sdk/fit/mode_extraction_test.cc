@@ -48,6 +48,7 @@ TEST(ExtractModes, PartsADoubletThreeHertzApart) {
 TEST(ExtractModes, TellsADecayFromThatOfTheRoom) {
   constexpr double kRoom_per_s = 17, kShare = 0.16;  // a reverberation time of 0.4 s, 8 dB below
   std::vector<TrueMode> truth;
+  truth.reserve(10);
   for (int m = 0; m < 10; ++m) truth.push_back({900 + 1400.0 * m, 5 + 3.0 * m, 0.1});
   const Recording heard = InRoom(Struck(truth, 1e-4, 0.8), kRoom_per_s, kShare);
   const ExtractedModes found = ExtractModes(FindRings({heard, heard}), [](double) {});

@@ -37,8 +37,8 @@ BodySurface BoxSurface(const std::vector<falls::Box>& boxes) {
     for (uint32_t i = 0; i < 8; ++i) {
       const Vector sign((i & 1U) != 0 ? 0.5 : -0.5, (i & 2U) != 0 ? 0.5 : -0.5,
                         (i & 4U) != 0 ? 0.5 : -0.5);
-      surface.vertices_m.push_back(ToVector(box.position_m) +
-                                   ToVector(box.sides_m).cwiseProduct(sign));
+      surface.vertices_m.emplace_back(ToVector(box.position_m) +
+                                      ToVector(box.sides_m).cwiseProduct(sign));
     }
     for (const std::array<uint32_t, 4>& q : {std::array<uint32_t, 4>{0, 2, 3, 1},
                                              {4, 5, 7, 6},
@@ -57,17 +57,17 @@ BodySurface BoxSurface(const std::vector<falls::Box>& boxes) {
 BodySurface BallSurface(double radius) {
   constexpr uint32_t kRings = 24, kAround = 48;
   BodySurface surface;
-  surface.vertices_m.push_back({0, 0, radius});
+  surface.vertices_m.emplace_back(0, 0, radius);
   for (uint32_t ring = 1; ring < kRings; ++ring) {
     const double down = std::numbers::pi * ring / kRings;
     for (uint32_t i = 0; i < kAround; ++i) {
       const double angle = 2 * std::numbers::pi * (i + (ring % 2) * 0.5) / kAround;
-      surface.vertices_m.push_back(radius * Vector(std::sin(down) * std::cos(angle),
-                                                   std::sin(down) * std::sin(angle),
-                                                   std::cos(down)));
+      surface.vertices_m.emplace_back(radius * Vector(std::sin(down) * std::cos(angle),
+                                                      std::sin(down) * std::sin(angle),
+                                                      std::cos(down)));
     }
   }
-  surface.vertices_m.push_back({0, 0, -radius});
+  surface.vertices_m.emplace_back(0, 0, -radius);
   const uint32_t last = 1 + (kRings - 2) * kAround, south = last + kAround;
   for (uint32_t i = 0; i < kAround; ++i) {
     const uint32_t j = (i + 1) % kAround;
@@ -187,7 +187,8 @@ std::vector<PairBlow> Strong(const Motion& motion, std::vector<PairBlow> blows, 
 double Quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
   std::ranges::sort(values);
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+  const double place = share * static_cast<double>(values.size() - 1);
+  return values[static_cast<size_t>(std::lround(place))];
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_fra
           double step_s = 1.0 / 2400);
 
 /// The blows of a reconstruction, taken together for each pair within 8 ms.
-std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& found);
+std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& contacts);
 
 /// How blows that were found compare with those of the engine. Blows of less than 3 % of the
 /// strongest one (by impulse over the root of the reduced mass) do not count.
@@ -43,7 +43,7 @@ struct Likeness {
   double median_size_error = 0, median_vector_error = 0;
   double median_point_m = 0;
 };
-Likeness Compare(const Fall& fall, const FoundContacts& found);
+Likeness Compare(const Fall& fall, const FoundContacts& contacts);
 
 /// The scenes of the tests and of the benchmark.
 falls::FallScene CornerScene();
