@@ -76,6 +76,7 @@ std::set<size_t> ExpectEqualLevels(const Body& body,
                                    double distance_m) {
   const auto levels_db = [&](const SoundingModes& sounding) {
     std::vector<double> levels;
+    levels.reserve(directions.size());
     for (const auto& direction : directions) {
       levels.push_back(EnergyDb(body, sounding, direction, distance_m));
     }

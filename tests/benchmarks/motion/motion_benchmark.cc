@@ -2,6 +2,7 @@
 //
 // Lets bodies fall in an engine at 2400 Hz, finds their contacts from the poses of frames alone,
 // and prints how these compare with the engine's: a line for each scene and frame rate.
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <string>
@@ -32,7 +33,7 @@ void PrintRow(const std::string& name, const falls::FallScene& scene, const Engi
               int frames_per_second) {
   const double step_s = name == "crowd" ? 1.0 / 240 : 1.0 / 2400;
   const Fall fall =
-      Drop(scene, engine, static_cast<int>(1 / step_s + 0.5) / frames_per_second, step_s);
+      Drop(scene, engine, static_cast<int>(std::lround(1 / step_s)) / frames_per_second, step_s);
   const double begin = CpuSeconds();
   const auto found = FindContacts(fall.motion);
   const double cpu_s = CpuSeconds() - begin;
