@@ -185,6 +185,7 @@ TEST(SoundingModes, ThreeOrMoreNeighboursApartFromOthersAreAMultiplet) {
   const auto eigenvalues = EigenvaluesFor(hz, kChime);
   const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
   std::vector<uint32_t> multiplets;
+  multiplets.reserve(modes.size());
   for (const SoundingMode& mode : modes) multiplets.push_back(mode.multiplet);
   EXPECT_EQ(multiplets, (std::vector<uint32_t>{1, 1, 1, 0, 0, 2, 2, 2, 2, 2, 2, 2, 0, 0, 0, 0, 0}));
   const double unit = Select(EigenvaluesFor({440}, kChime), kChime).modes[0].coupling;
