@@ -322,6 +322,7 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
   }
   const auto fitted = [&] {
     std::vector<fit::FittedBody> fitted_bodies;
+    fitted_bodies.reserve(sources.size());
     for (const Source& source : sources) fitted_bodies.push_back(source.body);
     return fit::FitMaterial(fitted_bodies, options.settings);
   };

@@ -32,7 +32,7 @@ Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_fra
           double step_s = 1.0 / 2400);
 
 /// The blows of a reconstruction, taken together for each pair within 8 ms.
-std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& contacts);
+std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& found);
 
 /// How blows that were found compare with those of the engine. Blows of less than 3 % of the
 /// strongest one (by impulse over the root of the reduced mass) do not count.
