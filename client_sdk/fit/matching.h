@@ -27,7 +27,7 @@ struct MeasuredBody {
   std::vector<double> frequency_errors_hz = {};  ///< standard errors
 };
 
-/// What is known of the material beforehand.
+/// The properties of the material that are known beforehand.
 struct MatchSettings {
   double least_speed_m_per_s = 900;  ///< of sqrt(E/rho)
   double most_speed_m_per_s = 7500;
@@ -53,8 +53,8 @@ struct Match {
 };
 
 /// Returns the best ways to match lines of one material, the best first, at most eight, of which no
-/// two have speeds within a percent. The score of the first less that of the second is the log odds
-/// of the first.
+/// two have speeds within a percent. The log odds of the first are its score less that
+/// of the second.
 ///
 /// The measured lines are a Poisson process with the density rho_0 + sum_j p N(ln f; ln f_j,
 /// delta), delta = 0.6 % with a wide tail, so that missing and false lines cost little and

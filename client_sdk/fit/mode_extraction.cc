@@ -38,7 +38,7 @@ constexpr double kSharp = 2e-4, kSharpDecay = 0.2;
 constexpr double kHum_per_s = 0.03;
 /// Decays this near to the room's are hard to tell from it.
 constexpr double kNearRoom = 0.3;
-/// Decays that are so many times as fast as the room's cannot be told from it.
+/// A decay that is this many times as fast as the room's cannot be told from it.
 constexpr double kHidden = 4;
 
 /// A pole of one run, in Hz and 1/s.
@@ -277,7 +277,7 @@ class Band {
     mode.heard_decay_per_s = mode.decay_per_s;
     mode.frequency_error_hz = std::max(1e-3, MedianDeviation(frequencies));
     mode.decay_error_per_s = std::max(1e-3, MedianDeviation(decays));
-    // What is left of a pole's neighbourhood is the same mode, seen worse.
+    // The other poles of the neighbourhood are the same mode, seen worse.
     const double hz = FrequencyTolerance(poles[best]) / 2;
     std::ranges::sort(members);
     std::vector<Pole> rest;

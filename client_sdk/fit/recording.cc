@@ -15,7 +15,7 @@ namespace carillon::fit {
 namespace {
 
 constexpr double kMostSeconds = 600;
-/// What is kept of the sound before a blow, for the noise, and after it.
+/// A ring keeps this much of the sound before its blow, for the noise, and after it.
 constexpr double kBefore_s = 0.25, kAfter_s = 3, kLeast_s = 0.06;
 /// Length of the pieces whose energies are compared.
 constexpr double kPiece_s = 0.002;
@@ -101,7 +101,8 @@ std::vector<Ring> FindRings(const std::vector<Recording>& recordings) {
         const size_t begin =
             std::max(previous, onset - std::min(onset, static_cast<size_t>(kBefore_s * rate)));
         // The last pieces before the next blow may have its beginning.
-        const size_t next = k + 1 < onsets.size() ? (onsets[k + 1] - 2) * piece : all.size();
+        const size_t next =
+            k + 1 < onsets.size() ? (std::max<size_t>(onsets[k + 1], 2) - 2) * piece : all.size();
         const size_t end = std::min(next, onset + static_cast<size_t>(kAfter_s * rate));
         if (end < onset + static_cast<size_t>(kLeast_s * rate)) continue;
         rings.push_back({.sample_rate_hz = rate,

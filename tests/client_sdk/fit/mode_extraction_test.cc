@@ -77,5 +77,17 @@ TEST(FindRings, PartsTheStrikesOfOneFile) {
   }
 }
 
+TEST(FindRings, ReadsNothingBeyondAFileThatBeginsAmidABlow) {
+  // Two pieces of 2 ms, of which the second is louder, look like two blows at the very beginning.
+  constexpr size_t kPiece = 96, kCount = 24000;
+  Recording recording{.name = "", .sample_rate_hz = kSampleRate_hz, .channels = {{}}};
+  recording.channels[0].assign(kCount, 0.9F);
+  std::fill_n(recording.channels[0].begin(), kPiece, 0.2F);
+  const std::vector<Ring> rings = FindRings({recording});
+  ASSERT_EQ(rings.size(), 1U);
+  EXPECT_EQ(rings[0].first_frame, kPiece);
+  EXPECT_EQ(rings[0].samples.size(), kCount - kPiece);
+}
+
 }  // namespace
 }  // namespace carillon::fit
