@@ -18,7 +18,6 @@ import urllib.request
 import meshes
 import torture
 from carillon.v1 import material_pb2
-from test_clients import free_port
 
 CLIENTS = 20
 RUN_S = 60 * float(os.environ.get("CARILLON_TORTURE_MINUTES") or torture.rounds(0.25, 10))
@@ -146,7 +145,7 @@ class ChurnTest(torture.ServedTest):
             self.assertLess(getattr(after, name), getattr(before, name) + 2 * CLIENTS)
 
     def test_nothing_grows_and_no_place_is_used_up(self):
-        self.serve("--scene-grace", "1", "--metrics", f"127.0.0.1:{free_port()}")
+        self.serve("--scene-grace", "1", "--metrics", f"127.0.0.1:{torture.free_port()}")
         model = self.client.wait(self.client.create(
             meshes.bar(), "obj", material=material_pb2.Material(preset=meshes.MATERIAL)))
         self.lives = self.deaths = 0

@@ -5,6 +5,7 @@ import contextlib
 import os
 import pathlib
 import resource
+import socket
 import tempfile
 import threading
 import time
@@ -19,6 +20,12 @@ LONG = os.environ.get("CARILLON_TORTURE") == "long"
 
 def rounds(short, long):
     return long if LONG else short
+
+
+def free_port():
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        return bound.getsockname()[1]
 
 
 def wait_until(condition, limit_s):
