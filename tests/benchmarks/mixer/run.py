@@ -1,13 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Carillon's mixer beside the synthesisers that others use, one after the other on one core, and one table.
+"""Carillon's mixer beside Klank of SuperCollider, one after the other on one core, and one table.
 
-Modes a core: how many modes one core renders in real time at 48 kHz, from CPU time; of other programs the median of
-three runs, fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run
+Modes a core: how many modes one core renders in real time at 48 kHz, from CPU time; of Klank the median of three runs,
+fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run
 in turns, and the medians over the turns are printed: of Carillon's modes, and of its ratio to Klank in each turn, with
 their range. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60 log-uniform from 20 ms to
 60 s; none ever sleeps. Error: largest deviation from the closed form in double over the largest sample, and the same
-of root mean squares; of another program against its own recurrence in double, so that only its rounding counts.
+of root mean squares; of Klank against its own recurrence in double, so that only its rounding counts.
 """
 
 import argparse
@@ -19,14 +19,10 @@ import subprocess
 import sys
 import tempfile
 
-import csound_peer
-import faust_peer
 import measuring
-import stk_peer
 import supercollider_peer
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PARTS = ("ringing", "directed", "accuracy", "flood", "latency", "session")
 
 
@@ -52,17 +48,6 @@ def has(target, build):
                           env=dict(os.environ, CARILLON_MOST_TARGET=target)).returncode == 0
 
 
-def peers(folder, modes):
-    """Name and modes a core of each."""
-    program = folder / "stk_peer"
-    subprocess.run(["g++", "-O3", "-march=native", "-o", program, HERE / "stk_peer.cc", "-lstk"], check=True)
-    yield "scsynth Klank, 800 modes", supercollider_peer.throughput(folder, modes)
-    yield "Faust pm.modeFilter, 100 modes, -vec", faust_peer.throughput(folder, modes[:100])
-    yield "Faust pm.modeFilter, 100 modes, scalar", faust_peer.throughput(folder, modes[:100], ())
-    yield "Csound mode", csound_peer.throughput(folder, modes)
-    yield "STK BiQuad", stk_peer.throughput(program, modes)
-
-
 def turns(options, folder, modes):
     """Carillon's results by target, kind and count of modes: (load, modes a core, times Klank) of each turn."""
     found = {}
@@ -81,10 +66,7 @@ def ringing(options, folder):
     print("\n## Modes a core\n\n| what | modes | load | modes a core | times Klank | from ... to |\n"
           "| --- | --- | --- | --- | --- | --- |")
     modes = population(options.build, 800)
-    others = dict(peers(folder, modes))
-    klank = next(iter(others.values()))
-    for name, rate in others.items():
-        row(name, "", "", f"{rate:,.0f}", f"{rate / klank:.2f}", "")
+    row("scsynth Klank, 800 modes", "", "", f"{supercollider_peer.throughput(folder, modes):,.0f}", "1.00", "")
     for (target, what, count), results in turns(options, folder, modes).items():
         loads, rates, times = zip(*results)
         what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[what]
@@ -111,11 +93,6 @@ def accuracy(options, folder):
     sound = measuring.read_wave(folder / "klank.wav")
     worst, mean = measuring.error_db(sound, supercollider_peer.exact(modes, 480000))
     row("scsynth Klank, one impulse", f"{worst:.1f}", f"{mean:.1f}")
-    single = faust_peer.sound(folder, modes[:100], ["-single"], 480000)
-    double = faust_peer.sound(folder, modes[:100], ["-double"], 480000)
-    worst, mean = measuring.error_db(single, double)
-    row("Faust -single against -double, 100 modes, one impulse", f"{worst:.1f}", f"{mean:.1f}")
-    row("Csound, STK", "compute in double", "")
 
 
 def flood(options, _folder):
