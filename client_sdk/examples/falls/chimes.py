@@ -8,15 +8,14 @@ import carillon
 import falls
 
 NOTES = ("D3", "E3", "G3", "A4", "B4", "D4")
-ENGINES = ("bullet", "ode")
 CIRCLE_M, EXTENT_M, SECONDS = 0.062, 0.4, 8
 
 
-def record(client, engine, trace, folder, *, seconds, build):
+def record(client, trace, folder, *, seconds, build):
     """Leaves the contact trace of the chimes, each in its place on the circle on which they hang."""
     subprocess.run([build / "bin/carillon-wind-chimes", "meshes", folder], check=True)
     models = [client.create_model(str(folder / f"{note}.obj"), "chime_aluminum", label=note) for note in NOTES]
-    play(engine, trace, [model.name for model in models], seconds=seconds, build=build)
+    play(trace, [model.name for model in models], seconds=seconds, build=build)
     recorded = carillon.Trace.read(trace)
     for number, chime in enumerate(recorded.objects):
         angle = 2 * math.pi * number / len(NOTES)
@@ -25,16 +24,16 @@ def record(client, engine, trace, folder, *, seconds, build):
     recorded.write(trace)
 
 
-def play(engine, trace, models, *arguments, seconds, build):
-    words = [build / "bin/carillon-wind-chimes", "play", "--offline", "--engine", engine, "--trace", trace, "--seconds",
-             seconds or SECONDS, *arguments]
+def play(trace, models, *arguments, seconds, build):
+    words = [build / "bin/carillon-wind-chimes", "play", "--offline", "--trace", trace, "--seconds", seconds or SECONDS,
+             *arguments]
     subprocess.run([*map(str, words), *models], check=True, stdout=subprocess.DEVNULL)
 
 
-def poses(engine, folder, *, seconds, build):
+def poses(folder, *, seconds, build):
     """The steps of the same simulation, with the poses of all bodies of `scene`."""
     trace = folder / "poses.contacts"
-    play(engine, trace, ["modalModels/unused"] * len(NOTES), "--picture", seconds=seconds, build=build)
+    play(trace, ["modalModels/unused"] * len(NOTES), "--picture", seconds=seconds, build=build)
     steps = carillon.Trace.read(trace).steps
     trace.unlink()
     return steps

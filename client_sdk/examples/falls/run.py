@@ -96,7 +96,7 @@ def record_example(client, options, folder, trace):
     import scene_makers
     if options.name == "chimes":
         import chimes
-        chimes.record(client, options.engine, trace, folder, seconds=options.seconds, build=options.build)
+        chimes.record(client, trace, folder, seconds=options.seconds, build=options.build)
         place_listener(trace, chimes.EXTENT_M)
         return chimes.scene()
     scene = scene_makers.EXAMPLES[options.name](folder)
@@ -116,7 +116,7 @@ def film(options, scene, folder, stem):
     how = {"seconds": options.seconds, "build": options.build}
     if options.name == "chimes":
         import chimes
-        frames = video.frames_of(scene, chimes.poses(options.engine, folder, **how))
+        frames = video.frames_of(scene, chimes.poses(folder, **how))
     else:
         frames = video.poses_of(options.engine, scene, rate=options.rate, **how)
     video.make(scene, frames, folder, stem.with_suffix(".wav"), stem.with_suffix(".mp4"))
@@ -171,14 +171,13 @@ def main():
                     str(ROOT / "client_sdk/python"), str(ROOT / "tests/integration")]
     os.environ.update(CARILLON_BIN_DIR=str(options.build / "bin"), CARILLON_BUILD_DIR=str(options.build))
     # They need the paths above.
-    import chimes
     import falls
     import scene_makers
     names = (*scene_makers.EXAMPLES, "chimes")
     if options.name not in names or options.engine not in falls.ENGINES:
         parser.error(f"the examples are {', '.join(names)}, the engines {', '.join(falls.ENGINES)}")
-    if options.name == "chimes" and options.engine not in chimes.ENGINES:
-        parser.error(f"the chimes hang on joints; their program has {' and '.join(chimes.ENGINES)}")
+    if options.name == "chimes" and options.engine != "bullet":
+        parser.error("the chimes hang on joints; their program has Bullet")
     if options.seconds is not None and not options.seconds > 0:
         parser.error("--seconds must be above zero")
     folder = (options.out or options.build / "examples").resolve()

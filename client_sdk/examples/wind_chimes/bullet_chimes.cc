@@ -171,7 +171,7 @@ class BulletChimes {
 
 }  // namespace
 
-Simulation ChimesInBullet(uint64_t seed, Purpose purpose) {
+Simulation Chimes(uint64_t seed, Purpose purpose) {
   return [chimes = std::make_shared<BulletChimes>(seed, purpose)] { return chimes->Step(); };
 }
 

@@ -37,15 +37,8 @@ struct PlayOptions {
   double gain = 1;
   std::string trace;
   bool offline = false;
-  std::string engine = "bullet";
   bool picture = false;
 };
-
-Simulation Simulate(const PlayOptions& options) {
-  const Purpose purpose = options.picture ? Purpose::kPicture : Purpose::kSound;
-  return options.engine == "ode" ? ChimesInOde(options.seed, purpose)
-                                 : ChimesInBullet(options.seed, purpose);
-}
 
 absl::Status WriteMeshes(const std::string& folder) {
   for (const Tube& tube : kTubes) {
@@ -146,7 +139,8 @@ absl::Status Play(const PlayOptions& options) {
     ASSIGN_OR_RETURN(trace, BeginTrace(options));
   }
 
-  const Simulation chimes = Simulate(options);
+  const Simulation chimes =
+      Chimes(options.seed, options.picture ? Purpose::kPicture : Purpose::kSound);
   int contact_count = 0;
   const auto start = std::chrono::steady_clock::now();
   const int step_count = static_cast<int>(options.seconds / kStep_s);
@@ -200,9 +194,6 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   play.add_option("--seconds", options.seconds, "The simulated time, s")->capture_default_str();
   play.add_option("--seed", options.seed, "The seed of the wind")->capture_default_str();
-  play.add_option("--engine", options.engine, "The engine: bullet or ode")
-      ->check(CLI::IsMember({"bullet", "ode"}))
-      ->capture_default_str();
   play.add_option("--gain", options.gain, "The linear gain of every chime")->capture_default_str();
   play.add_option("--trace", options.trace, "Record the contacts to this contact trace");
   play.add_flag("--offline", options.offline,

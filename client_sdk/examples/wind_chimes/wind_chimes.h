@@ -24,9 +24,8 @@ enum class Purpose {
 /// the order of kTubes, and their frames are those of WriteTubeMesh.
 using Simulation = std::function<v1::ContactStep()>;
 
-/// Simulates in Bullet or in ODE six tubes that hang from threads around a wooden clapper. The
-/// wind drives the clapper in gusts. Two simulations with the same seed give the same contacts.
-Simulation ChimesInBullet(uint64_t seed, Purpose purpose = Purpose::kSound);
-Simulation ChimesInOde(uint64_t seed, Purpose purpose = Purpose::kSound);
+/// Simulates in Bullet six tubes that hang from threads around a wooden clapper. The wind drives
+/// the clapper in gusts. Two simulations with the same seed give the same contacts.
+Simulation Chimes(uint64_t seed, Purpose purpose = Purpose::kSound);
 
 }  // namespace carillon::wind_chimes

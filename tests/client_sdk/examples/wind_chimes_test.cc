@@ -12,32 +12,28 @@
 namespace carillon::wind_chimes {
 namespace {
 
-using Engine = Simulation (*)(uint64_t seed, Purpose purpose);
-
 /// All contacts of the first seconds, as one step.
-v1::ContactStep ContactsOf(Engine engine, uint64_t seed, double seconds) {
-  const Simulation chimes = engine(seed, Purpose::kSound);
+v1::ContactStep ContactsOf(uint64_t seed, double seconds) {
+  const Simulation chimes = Chimes(seed);
   v1::ContactStep all;
   for (int i = 0; i < seconds / kStep_s; ++i) all.MergeFrom(chimes());
   return all;
 }
 
-class WindChimesTest : public testing::TestWithParam<Engine> {};
-
-TEST_P(WindChimesTest, OneSeedGivesTheSameContactsEveryTime) {
-  const std::string first = ContactsOf(GetParam(), 1, 4).SerializeAsString();
-  EXPECT_EQ(first, ContactsOf(GetParam(), 1, 4).SerializeAsString());
-  EXPECT_NE(first, ContactsOf(GetParam(), 2, 4).SerializeAsString());
+TEST(WindChimes, OneSeedGivesTheSameContactsEveryTime) {
+  const std::string first = ContactsOf(1, 4).SerializeAsString();
+  EXPECT_EQ(first, ContactsOf(1, 4).SerializeAsString());
+  EXPECT_NE(first, ContactsOf(2, 4).SerializeAsString());
 }
 
-TEST_P(WindChimesTest, EveryTubeIsStruckOnItsOuterSurface) {
-  const v1::ContactStep step = ContactsOf(GetParam(), 1, 20);
+TEST(WindChimes, EveryTubeIsStruckOnItsOuterSurface) {
+  const v1::ContactStep step = ContactsOf(1, 20);
   std::set<uint32_t> struck;
   for (const v1::Contact& contact : step.contacts()) {
     ASSERT_GE(contact.object(), 1);
     ASSERT_LE(contact.object(), kTubes.size());
     struck.insert(contact.object());
-    // A fraction of Bullet's margin of 1 mm, or as far as ODE lets bodies overlap.
+    // A fraction of Bullet's margin of 1 mm.
     constexpr double kOverlap_m = 5e-4;
     const v1::Vec3& point = contact.point_m();
     EXPECT_NEAR(std::hypot(point.x(), point.y()), kOuterRadius_m, kOverlap_m);
@@ -56,8 +52,8 @@ TEST_P(WindChimesTest, EveryTubeIsStruckOnItsOuterSurface) {
   EXPECT_EQ(struck.size(), kTubes.size());
 }
 
-TEST_P(WindChimesTest, APictureHasThePosesOfAllParts) {
-  const Simulation chimes = GetParam()(1, Purpose::kPicture);
+TEST(WindChimes, APictureHasThePosesOfAllParts) {
+  const Simulation chimes = Chimes(1, Purpose::kPicture);
   v1::ContactStep step;
   for (int i = 0; i < 3 / kStep_s; ++i) step = chimes();
   std::set<uint32_t> posed;
@@ -71,11 +67,6 @@ TEST_P(WindChimesTest, APictureHasThePosesOfAllParts) {
   }
   EXPECT_EQ(posed, (std::set<uint32_t>{1, 2, 3, 4, 5, 6, kClapperHandle, kSailHandle}));
 }
-
-INSTANTIATE_TEST_SUITE_P(Engines, WindChimesTest, testing::Values(&ChimesInBullet, &ChimesInOde),
-                         [](const auto& engine) {
-                           return engine.param == &ChimesInOde ? "Ode" : "Bullet";
-                         });
 
 }  // namespace
 }  // namespace carillon::wind_chimes
