@@ -43,12 +43,6 @@ void AddStatus(CLI::App& app, Program& program) {
       });
 }
 
-void AddHealth(CLI::App& app, Program& program) {
-  app.add_subcommand("health", "Show which services of the daemon are SERVING")->callback([&] {
-    program.command = [&] { return ShowHealth(*program.Daemon(), program.json); };
-  });
-}
-
 void AddCollect(CLI::App& db, Program& program) {
   auto budget_mib = std::make_shared<uint64_t>(0);
   CLI::App& collect =
@@ -119,9 +113,9 @@ void AddTransfer(CLI::App& app, Program& program) {
 }
 
 void AddDoctor(CLI::App& app, Program& program) {
-  CLI::App& doctor = *app.add_subcommand(
-      "doctor", "Check the settings and the health of the daemon, and say what to do");
-  doctor.callback([&program] { program.command = [&program] { return Diagnose(program); }; });
+  app.add_subcommand("doctor", "Check the health of the daemon, and say what to do")->callback([&] {
+    program.command = [&] { return Diagnose(*program.Daemon(), program.json); };
+  });
 }
 
 /// Adds the options of the object that is struck.
@@ -270,7 +264,6 @@ const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
 
 void AddCommands(CLI::App& app, Program& program) {
   AddStatus(app, program);
-  AddHealth(app, program);
   AddDoctor(app, program);
   AddDatabase(app, program);
   AddModel(app, program);

@@ -69,7 +69,7 @@ class Lint(TreeTest):
         self.write("server/api/CMakeLists.txt", "carillon_room(server_api SOURCES a.cc)\n")
         self.write("server/base/CMakeLists.txt", "carillon_room(server_base SOURCES b.cc DEPENDS server_api)\n")
         self.write("precompute/mesh/a.cc", '#include "server/base/clock.h"\n#include <grpcpp/grpcpp.h>\n')
-        self.assert_found(check_includes.check(self.root), "precompute/mesh/a.cc:1", "grpc (grpcpp/grpcpp.h) may appear in",
+        self.assert_found(check_includes.check(self.root), "precompute/mesh/a.cc:1", "grpc (grpcpp/grpcpp.h)",
                           "server_base (server/base) may not depend on server_api")
 
     def test_a_reason_without_a_row_and_a_row_without_a_reason_are_found(self):
@@ -96,13 +96,14 @@ class Lint(TreeTest):
         self.write("deploy/lint/rooms.toml", ROOMS)
         self.write("server/base/clock.cc", "")
         self.write("ARCHITECTURE.md", f"# Page\n{check_text.BEGIN}\n{check_text.END}\nafter\n")
-        self.assert_found(check_text.check_room_table(self.root, False), "ARCHITECTURE.md:2: the table of rooms differs")
+        self.assert_found(check_text.check_room_table(self.root, False), "ARCHITECTURE.md:2: the table of rooms")
         list(check_text.check_room_table(self.root, True))
         self.assert_found(check_text.check_room_table(self.root, False))
 
     def test_a_contract_that_breaks_the_last_release_is_found(self):
         def git(*arguments):
-            subprocess.run(["git", "-C", self.root, "-c", "user.name=a", "-c", "user.email=a@b.c", *arguments], check=True)
+            words = ["git", "-C", self.root, "-c", "user.name=a", "-c", "user.email=a@b.c", *arguments]
+            subprocess.run(words, check=True)
         self.copy("proto/buf.yaml")
         for command in (["init", "-q"], ["commit", "-q", "--allow-empty", "-m", "x"]):
             git(*command)

@@ -47,23 +47,6 @@ class TlsTest(unittest.TestCase):
             self.assertLess(time.monotonic(), end_s, (self.folder / "log").read_text())
             time.sleep(0.05)
 
-    def test_the_doctor_finds_files_with_which_the_daemon_would_not_start_again(self):
-        settings = r"(?m)^{} +settings +{}"
-        good = self.daemon.command("doctor", check=False).stdout
-        self.assertRegex(good, settings.format("OK", "a start would accept the settings and the files that they name$"))
-        whole = self.key.read_bytes()
-        for name, harm in (("truncated", lambda: self.key.write_bytes(whole[:100])),
-                           ("open to all", lambda: self.key.chmod(0o666)),
-                           ("removed", self.key.unlink)):
-            with self.subTest(name=name):
-                harm()
-                done = self.daemon.command("doctor", check=False)
-                self.assertEqual(done.returncode, 1)
-                self.assertRegex(done.stdout, settings.format(
-                    "FAULT", f"the daemon runs, but would not start again: TLS_UNUSABLE: .*{self.key.name}"))
-                self.key.write_bytes(whole)
-                self.key.chmod(0o600)
-
     def test_without_roots_it_says_that_the_daemon_may_want_tls(self):
         done = self.status()
         self.assertEqual(done.returncode, 3)

@@ -142,9 +142,6 @@ struct RenderOptions {
 /// Shows the audio device, the mixer and the load of the daemon, and its features and limits. As
 /// JSON these are the members of GetMixerResponse and, in "server", those of GetServerInfoResponse.
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
-/// Shows which services are SERVING. Errors: those of Client::IsServing, FailedPrecondition
-/// (NOT_SERVING), if one of them is not.
-absl::Status ShowHealth(const client::Client& daemon, bool json);
 /// Creates the models of files. A file that gives no model does not stop the others. Errors: that
 /// of the file if there is one file; otherwise FailedPrecondition (MODELS_FAILED), Internal
 /// (OUTPUT_NOT_WRITABLE: the report), Unavailable (SERVER_UNAVAILABLE), which stops all.

@@ -38,7 +38,7 @@ absl::Status FlushOutput() {
 int Report(const absl::Status& status, bool json) {
   if (status.ok()) return kDone;
   const v1::ErrorInfo error = ToErrorInfo(status);
-  // `health` and `doctor` have printed what does not serve, and one document of JSON is enough.
+  // `doctor` has printed what does not serve, and one document of JSON is enough.
   if (json && error.reason() != "NOT_SERVING") absl::PrintF("%s\n", ErrorJson(status));
   std::string message = error.message();
   std::ranges::replace(message, '\n', ' ');

@@ -22,6 +22,10 @@ std::string WhyUnavailable(const std::string& text, const std::string& server) {
                         "); check that the daemon there has a TLS certificate for this address, "
                         "and that the roots given vouch for it");
   }
+  if (absl::StrContains(text, "Permission denied") && absl::StartsWith(server, "unix:")) {
+    return absl::StrCat("this user may not use ", server, " (", text,
+                        "): for a daemon of the system, join the group carillon and log in again");
+  }
   if (closed && !absl::StartsWith(server, "unix:")) {
     return absl::StrCat("the program at ", server, " closed the connection (", text,
                         "); if it is a daemon with TLS, give the roots that vouch for it "

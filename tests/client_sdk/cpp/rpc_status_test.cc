@@ -46,6 +46,12 @@ TEST(RpcStatus, NamesTheServerThatDoesNotAnswer) {
   EXPECT_THAT(status.ToString(), HasSubstr("unix:/run/c.sock"));
 }
 
+TEST(RpcStatus, TellsAUserWithoutTheRightWhichGroupHasIt) {
+  const absl::Status status =
+      FromRpc(grpc::Status(grpc::StatusCode::UNAVAILABLE, "unix:/x: Permission denied"), "unix:/x");
+  EXPECT_THAT(status.ToString(), HasSubstr("join the group carillon"));
+}
+
 TEST(RpcStatus, TellsHowToRepairAMessageThatIsTooLarge) {
   const absl::Status status =
       FromRpc(grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED,

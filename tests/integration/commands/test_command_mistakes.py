@@ -79,7 +79,7 @@ class LostOutputTest(CommandLineTest):
         item = contact_trace_pb2.ContactTraceObject(handle=1, modal_model=self.model, material=MATERIAL)
         sound.write_trace(trace, [item], [contact_pb2.ContactStep(time_s=0, contacts=[impulse])])
         strike = ("strike", "bar", "--point", "0,0.008,0.01", "--impulse", "0,0,-0.01", "--seconds", "0.01")
-        commands = (("--help",), ("--version",), ("--help-all",), ("status",), ("health",), ("db", "stats"),
+        commands = (("--help",), ("--version",), ("--help-all",), ("status",), ("db", "stats"),
                     ("doctor",), ("model", "list"), ("model", "show", "bar"), ("job", "list"), ("job", "show", "bar"),
                     ("job", "watch", "bar"), ("material",), ("volume",), ("stop",),
                     ("listen", "--seconds", "0.1"), strike,
