@@ -23,6 +23,7 @@ INSTALLED = {
     "LICENSE": "carillon /usr/share/doc/carillon/copyright",
     "docs": "carillon /usr/share/doc/carillon/docs",
     "proto/README.md": "carillon /usr/share/doc/carillon/CONTRACT.md",
+    "proto/errors.md": "carillon /usr/share/doc/carillon/ERRORS.md",
     "proto/materials.textproto": "carillon /usr/share/doc/carillon/materials.textproto",
     "client_sdk/interchange/README.md": "carillon /usr/share/doc/carillon/INTERCHANGE.md",
     "deploy/demo/spectrogram.png": "carillon /usr/share/doc/carillon/spectrogram.png",

@@ -1,13 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the tables of proto/README.md and the code, that of the clients for Python and Node included, name the
-same error reasons and the same warnings."""
+"""Checks that the tables of proto/errors.md and the code, that of the clients for Python and Node included, name the
+same error reasons and the same warnings, and that `carillon doctor` has each finding of docs/troubleshoot.md."""
 
 import re
 
 import project
 
-TABLES = "proto/README.md"
+TABLES, FINDINGS = "proto/errors.md", "docs/troubleshoot.md"
 ROW = re.compile(r"^\| *`?([A-Z][A-Z0-9_]+)`? *\| *([A-Z_]*)")
 NAME = r"([A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*)"
 QUOTED = rf"['\"]{NAME}['\"]"
@@ -26,14 +26,22 @@ MENTION = re.compile(rf'"{NAME}(?:: |")')
 
 
 def listed(root):
-    """The rows (name, gRPC code, line number) of the table of reasons, and those of the table of warnings."""
-    rows, heading = {"Warnings": [], "Errors": []}, "Errors"
+    """The rows (group, name, gRPC code, line number) of the tables of reasons, and those of the table of warnings."""
+    reasons, warnings, heading = [], [], ""
     for number, line in enumerate((root / TABLES).read_text().splitlines(), start=1):
         if line.startswith("## "):
             heading = line[3:]
-        if (row := ROW.match(line)) and heading in rows:
-            rows[heading].append((row[1], row[2], number))
-    return rows["Errors"], rows["Warnings"]
+        if row := ROW.match(line):
+            (warnings if heading == "Warnings" else reasons).append((heading, row[1], row[2], number))
+    return reasons, warnings
+
+
+def unused_findings(root, mentioned):
+    """Each row of the page of findings that no code mentions."""
+    page = root / FINDINGS
+    for number, line in enumerate(page.read_text().splitlines() if page.exists() else (), start=1):
+        if (row := ROW.match(line)) and line.count(" | ") == 2 and row[1] not in mentioned:
+            yield f"{FINDINGS}:{number}: carillon doctor has no finding {row[1]}"
 
 
 def sources(root):
@@ -57,21 +65,26 @@ def uses(files, patterns):
 def check(root):
     files = list(sources(root))
     reasons, warnings = listed(root)
-    codes = {code for _, code, _ in reasons}  # the reasons of errors without one
+    codes = {code for _, _, code, _ in reasons}  # the reasons of errors without one
     mentioned = {name for kind, _, text in files if kind == "cxx" for name in MENTION.findall(text)}
+    yield from unused_findings(root, mentioned)
     for rows, patterns, more_known, more_used in ((reasons, REASONS, codes, mentioned),
                                                   (warnings, WARNINGS, set(), set())):
-        names = [name for name, _, _ in rows]
+        names = [name for _, name, _, _ in rows]
         found = list(uses(files, patterns))
         used = more_used | {name for name, _, _ in found}
         for name, path, number in found:
             if name not in more_known.union(names):
                 yield f"{path}:{number}: {name} is not in the table of {TABLES}"
-        for name, _, number in rows:
+        for _, name, _, number in rows:
             if name not in used:
                 yield f"{TABLES}:{number}: no code gives {name}"
-        if names != sorted(set(names)):
-            yield f"{TABLES}: the names are not in alphabetical order, each once"
+        places = [(group, name) for group, name, _, _ in rows]
+        groups = list(dict.fromkeys(group for group, _ in places))
+        if places != sorted(places, key=lambda place: (groups.index(place[0]), place[1])):
+            yield f"{TABLES}: the names of a group are not in alphabetical order"
+        if len(names) != len(set(names)):
+            yield f"{TABLES}: a name has two rows"
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks text: licences of source files, spelling, lines of at most 120 columns, and ARCHITECTURE's table of rooms.
+"""Checks text: licences of source files, spelling, lines of at most 120 columns, the links of pages to files and
+headings, and ARCHITECTURE's table of rooms.
 
 check_text.py --write prints that table anew from rooms.toml.
 """
 
 import fnmatch
+import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -21,6 +24,8 @@ SPELT = (*project.CXX_SUFFIXES, ".md", ".proto", ".py", ".sh", ".toml", ".txt", 
 # Right although codespell has them in its list: the order ACN, "to and fro", the journal Numer. Math., and statements
 # of OBJ files.
 RIGHT = "acn,fo,fro,lod,numer,parm,te"
+FENCED = re.compile(r"(?ms)^```.*?^```$")
+LINK = re.compile(r"\]\(([^)\s:]+)\)")
 PAGE = "ARCHITECTURE.md"
 BEGIN = "<!-- The table of rooms: deploy/lint/check_text.py --write prints it from rooms.toml. -->"
 END = "<!-- The end of the table of rooms. -->"
@@ -52,6 +57,25 @@ def check_spelling(root):
         found = subprocess.run(["codespell", "--ignore-words-list", RIGHT, *files], cwd=root, stdout=subprocess.PIPE,
                                text=True, check=False)
         yield from found.stdout.splitlines()
+
+
+def anchors(text):
+    """The anchors of a page's headings, as GitHub makes them."""
+    for heading in re.findall(r"(?m)^#+ (.*)$", FENCED.sub("", text)):
+        shown = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading)
+        yield re.sub(r"[^\w\- ]", "", shown.lower()).replace(" ", "-")
+
+
+def check_links(root):
+    """Each link of a page to a file or a heading that is not there; pictures and sounds are links, too."""
+    pages = {path: path.read_text() for path in files_of(root) if path.suffix == ".md"}
+    for path, text in pages.items():
+        for link in LINK.finditer(FENCED.sub(lambda code: "\n" * code[0].count("\n"), text)):
+            target, _, anchor = link[1].partition("#")
+            place = root / os.path.normpath(path.relative_to(root).parent / target) if target else path
+            if not place.exists() or (anchor and place in pages and anchor not in anchors(pages[place])):
+                number = text.count("\n", 0, link.start()) + 1
+                yield f"{path.relative_to(root)}:{number}: the link {link[1]} leads nowhere"
 
 
 def cell(names):
@@ -94,6 +118,7 @@ def check_room_table(root, write=False):
 def check(root, write=False):
     yield from check_lines(root)
     yield from check_spelling(root)
+    yield from check_links(root)
     yield from check_room_table(root, write)
 
 

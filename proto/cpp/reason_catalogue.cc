@@ -17,7 +17,7 @@
 namespace carillon {
 namespace {
 
-constexpr char kContract[] =
+constexpr char kPages[] =
 #include "reasons.inc"
     ;
 
@@ -27,22 +27,25 @@ bool IsName(absl::string_view cell) {
   });
 }
 
-/// Reads the rows of the sections "Warnings" (name, meaning, counts, figures) and "Errors" (name,
-/// codes, meaning, repair).
+/// Reads the rows of the groups of reasons (name, codes, meaning, repair), of the section
+/// "Warnings" (name, meaning, counts, figures), and of findings (name, meaning, repair).
 std::vector<CatalogueReason> ReadTables() {
   std::vector<CatalogueReason> reasons;
-  absl::string_view section;
-  for (const absl::string_view line : absl::StrSplit(kContract, '\n')) {
-    if (absl::StartsWith(line, "## ")) section = line.substr(3);
+  absl::string_view group;
+  for (const absl::string_view line : absl::StrSplit(kPages, '\n')) {
+    if (absl::StartsWith(line, "## ")) group = line.substr(3);
     const std::vector<std::string> cells = absl::StrSplit(line, " | ");
-    if (cells.size() != 4 || !absl::StartsWith(line, "| ")) continue;
+    const bool is_finding = cells.size() == 3;
+    if ((cells.size() != 4 && !is_finding) || !absl::StartsWith(line, "| ")) continue;
     const std::string name = cells[0].substr(2);
-    const std::string last(absl::StripSuffix(cells[3], " |"));
-    if (section == "Errors" && IsName(name)) {
-      reasons.push_back({.name = name, .code = cells[1], .meaning = cells[2], .repair = last});
-    } else if (section == "Warnings" && IsName(name)) {
-      reasons.push_back({.name = name, .code = "", .meaning = cells[1], .repair = ""});
-    }
+    if (!IsName(name)) continue;
+    CatalogueReason& reason = reasons.emplace_back();
+    reason.name = name;
+    reason.group = std::string(group);
+    const bool has_code = !is_finding && group != "Warnings";
+    if (has_code) reason.code = cells[1];
+    reason.meaning = cells[has_code ? 2 : 1];
+    if (has_code || is_finding) reason.repair = std::string(absl::StripSuffix(cells.back(), " |"));
   }
   return reasons;
 }

@@ -26,6 +26,18 @@ class Links(TreeTest):
         for text in ("[a](https://a.org/b)", "[a](#b)", "```js\n[a](b)\n```\n"):
             self.assertEqual(self.mended(text, "docs/a.md"), text)
 
+    def test_no_page_of_the_packages_has_a_dead_link(self):
+        """Pictures and sounds are links, too. All packages are installed into one tree."""
+        packages = self.root / "packages"
+        packages.mkdir()
+        for package in {where.split()[0] for where in install_documents.INSTALLED.values()}:
+            (packages / package).symlink_to(self.root)
+            self.write(f"usr/share/doc/{package}/copyright", "")
+        install_documents.install(ROOT, packages)
+        pages = list((self.root / "usr/share/doc").rglob("*.md"))
+        self.assertGreater(len(pages), 60)
+        self.assert_found(installed_links.dead_links(self.root))
+
     def test_a_dead_link_of_an_installed_page_is_found(self):
         self.write("usr/share/doc/a/b.md", "[c](c.md#d) ![e](e.mp4)\n[web](https://a.org)\n")
         self.write("usr/share/doc/a/c.md", "[out](../../../../../etc/passwd)\n")

@@ -73,9 +73,15 @@ class Lint(TreeTest):
                           "server_base (server/base) may not depend on server_api")
 
     def test_a_reason_without_a_row_and_a_row_without_a_reason_are_found(self):
-        table = "| reason | gRPC code | meaning | repair |\n| --- |\n| NO_FILE | NOT_FOUND | m | r |\n"
+        table = "## Files\n| reason | gRPC code | meaning | repair |\n| --- |\n| NO_FILE | NOT_FOUND | m | r |\n"
         self.found(check_reasons.check, server__a_dot_cc='Refusal(code, "NO_FILE", "x");\n',
-                   proto__README_dot_md=table)
+                   proto__errors_dot_md=table)
+        self.found(check_reasons.check, "a name has two rows",
+                   proto__errors_dot_md=table + "## Bodies\n| NO_FILE | NOT_FOUND | m | r |\n")
+        self.found(check_reasons.check, "troubleshoot.md:2: carillon doctor has no finding IS_LOUD",
+                   proto__errors_dot_md=table, client_sdk__a_dot_cc='note("IS_MUTED", "x");',
+                   docs__troubleshoot_dot_md="| IS_MUTED | it is | do |\n| IS_LOUD | it is | do |\n")
+        self.write("docs/troubleshoot.md", "")
         self.found(check_reasons.check, "a.cc:2: NO_NAME is not", "no code gives NO_FILE",
                    server__a_dot_cc='Refusal(code,\n  "NO_NAME", "x");\n')
 
@@ -91,6 +97,12 @@ class Lint(TreeTest):
         self.found(check_text.check_lines, "README.md:1: 121 columns", "precompute/a.cc:1",
                    precompute__a_dot_cc=APACHE, README_dot_md="a" * 121 + "\n")
         self.found(check_text.check_spelling, "received", README_dot_md="It is " + "rec" + "ieved.\n")
+
+    def test_a_link_to_no_file_or_heading_is_found_and_code_is_not_read(self):
+        page = "# A `b`, c\n[x](b.md#d-e) [y](#a-b-c) [web](https://a.org/b)\n```\n[z](none)\n```\n"
+        self.found(check_text.check_links, docs__a_dot_md=page, docs__b_dot_md="## D e\n[y](a.md)\n")
+        self.found(check_text.check_links, "docs/b.md:2: the link a.md#d-e", "docs/b.md:3: the link ../b.flac",
+                   docs__b_dot_md="# D e\n[x](a.md#d-e)\n![y](../b.flac)\n")
 
     def test_a_table_of_rooms_that_differs_is_found_and_written(self):
         self.write("deploy/lint/rooms.toml", ROOMS)

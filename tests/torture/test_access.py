@@ -42,9 +42,11 @@ def line_of(name, roles):
 def documented_roles():
     """The table of docs/limits_and_access.md: the role of each method."""
     page = (ROOT / "docs/limits_and_access.md").read_text()
-    rows = re.findall(r"^\| `(\w+)`( \(private\))? \| (.+) \| (\w+|its run's token) \|$", page, re.MULTILINE)
+    rows = re.findall(r"^\| (\w+|its run's token) \| (`.+) \|$", page, re.MULTILINE)
     return {f"/carillon.{'worker.' if private else ''}v1.{service}/{method}": role
-            for service, private, methods, role in rows for method in re.findall(r"`(\w+)`", methods)}
+            for role, calls in rows
+            for service, private, methods in re.findall(r"`(\w+)`( \(private\))?: ([^;]+)", calls)
+            for method in re.findall(r"`(\w+)`", methods)}
 
 
 def methods_of_contract():

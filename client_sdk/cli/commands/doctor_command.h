@@ -6,10 +6,11 @@
 
 namespace carillon::cli {
 
-/// Prints a line for the health of the daemon and of each service, with what to do where it does
-/// not serve. Prints the same as JSON if that is asked for: {"fault_count": 1, "findings":
-/// [{"subject": ..., "verdict": "OK" or "FAULT", "text": ...}]}. Errors: FailedPrecondition
-/// (NOT_SERVING), those of Client::IsServing.
+/// Prints a line for the health of the daemon and of each service, and one for each cause of
+/// silence or loss, with what docs/troubleshoot.md says to do. Prints the same as JSON if that is
+/// asked for: {"fault_count": 1, "findings": [{"subject": ..., "verdict": "OK", "NOTE" or "FAULT",
+/// "text": ..., "id": "FRAMES_LOST"}]}. Errors: FailedPrecondition (NOT_SERVING), those of
+/// Client::IsServing and Client::GetMixer.
 absl::Status Diagnose(const client::Client& daemon, bool json);
 
 }  // namespace carillon::cli

@@ -165,17 +165,24 @@ absl::Status Explain(const std::string& name, bool json) {
     ASSIGN_OR_RETURN(const CatalogueReason reason, FindReason(name));
     reasons = {reason};
   }
+  std::string group;
   for (const CatalogueReason& reason : reasons) {
     if (json) {
       PrintJson({{"reason", reason.name},
+                 {"group", reason.group},
                  {"code", reason.code},
                  {"meaning", reason.meaning},
                  {"repair", reason.repair}});
     } else if (name.empty()) {
-      absl::PrintF("%-30s %s\n", reason.name, reason.meaning);
+      if (reason.group != group) absl::PrintF("%s:\n", reason.group);
+      group = reason.group;
+      absl::PrintF("  %-30s %s\n", reason.name, reason.meaning);
     } else {
       absl::PrintF("%s (%s)\nmeaning    %s\n", reason.name,
-                   reason.code.empty() ? "a warning" : reason.code, reason.meaning);
+                   !reason.code.empty()    ? reason.code
+                   : reason.repair.empty() ? "a warning"
+                                           : "a finding of carillon doctor",
+                   reason.meaning);
       if (!reason.repair.empty()) absl::PrintF("repair     %s\n", reason.repair);
     }
   }

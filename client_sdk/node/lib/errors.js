@@ -9,7 +9,7 @@ const DETAILS_KEY = 'grpc-status-details-bin';
 const TOO_LARGE = /^Received message larger than max \((\d+) vs\.? (\d+)\)/;
 
 /**
- * A refusal. `reason` is stable and one of proto/README.md's; `message` says what was wrong, where, and how to repair
+ * A refusal. `reason` is stable and one of proto/errors.md's; `message` says what was wrong, where, and how to repair
  * it; `metadata` has figures that belong to the reason, and `remedies` changes to the request that may help, as the
  * message Remedy of error.proto.
  */

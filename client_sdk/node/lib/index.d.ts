@@ -183,7 +183,7 @@ export interface ObjectSettings {
   radiation?: Radiation;
 }
 
-/** A refusal. `reason` is stable and one of proto/README.md's; `metadata` has figures that belong to it. */
+/** A refusal. `reason` is stable and one of proto/errors.md's; `metadata` has figures that belong to it. */
 export class CarillonError extends Error {
   constructor(reason: string, text: string, metadata?: Record<string, string>, remedies?: Remedy__Output[]);
   readonly reason: string;

@@ -8,7 +8,7 @@
 namespace carillon {
 
 /// Fills in the warnings of a stream's answer from its other fields and from the findings about its
-/// contacts. Each warning is a probable mistake of the client; proto/README.md lists them.
+/// contacts. Each warning is a probable mistake of the client; proto/errors.md lists them.
 void AddWarnings(const IntakeFindings& findings, v1::StreamContactsResponse& report);
 
 /// Does the same for a rendering, in which no contact is late.

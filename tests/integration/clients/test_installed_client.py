@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The clients of C++ and C as users get them: installed by the commands of the pages docs/ten_minutes_*.md, found by
+"""The clients of C++ and C as users get them: installed by the commands of CONTRIBUTING.md, found by
 CMake, pkg-config and the compiler, and sounding."""
 
 import os
@@ -29,12 +29,12 @@ def run(*command, **options):
 
 def commands(page, heading):
     """The indented blocks of a section of a page, which bash runs."""
-    section = re.search(rf"(?ms)^## {heading}$(.*?)^## ", (ROOT / "docs" / page).read_text())[1]
+    section = re.search(rf"(?ms)^## {heading}$(.*?)^## ", (ROOT / page).read_text())[1]
     return [re.sub("(?m)^    ", "", block) for block in re.findall(r"(?m)(?:^    .*\n)+", section)]
 
 
-INSTALL, FIND = commands("ten_minutes_cpp.md", "Or install from a build")
-COMPILE_C, = commands("ten_minutes_c.md", "Install")
+INSTALL, FIND = commands("CONTRIBUTING.md", "Install the clients from a build")
+COMPILE_C, = commands("docs/ten_minutes_c.md", "Install")
 
 
 class InstalledClientTest(DaemonTest):

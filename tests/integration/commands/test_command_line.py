@@ -235,8 +235,9 @@ class ReportTest(CommandLineTest):
 
     def test_a_reason_is_explained_and_one_that_is_not_there_has_its_nearest(self):
         told = self.json_of("explain", "mesh_not_closed")
-        self.assertEqual((told["reason"], told["code"]), ("MESH_NOT_CLOSED", "INVALID_ARGUMENT"))
-        self.assertIn(f"| {told['meaning']} | {told['repair']} |", (ROOT / "proto/README.md").read_text())
+        self.assertEqual([told[key] for key in ("reason", "group", "code")],
+                         ["MESH_NOT_CLOSED", "Meshes", "INVALID_ARGUMENT"])
+        self.assertIn(f"| {told['meaning']} | {told['repair']} |", (ROOT / "proto/errors.md").read_text())
         wrong = carillon("--json", "explain", "MESH_NOT_CLOSE")
         self.assertEqual(wrong.returncode, 1)
         error = json.loads(wrong.stdout)["error"]

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`carillon doctor` where a part of the daemon does not serve."""
+"""`carillon doctor` where a part of the daemon does not serve, or nothing is heard."""
 
 import json
 import pathlib
+import re
 import shutil
 import tempfile
 import time
 import unittest
 
-from daemon import Daemon
+import carillon
+from daemon import ROOT, Daemon
 
 
 class HealthTest(unittest.TestCase):
@@ -55,6 +57,22 @@ class HealthTest(unittest.TestCase):
         while self.daemon.health(self.DECOMPOSITIONS) != "SERVING":
             self.assertLess(time.monotonic(), end_s)
             time.sleep(0.05)
+
+    def test_it_finds_why_nothing_is_heard_and_says_what_the_page_says(self):
+        self.assertEqual(self.findings("NOTE"), {})
+        self.daemon.command("volume", "--mute")
+        with carillon.connect(self.daemon.server) as c, c.scene() as heard, c.scene() as other:
+            heard.update(solo=True)
+            told = json.loads(self.daemon.command("doctor", "--json").stdout)["findings"]
+        notes = {found["id"]: found for found in told if found["verdict"] == "NOTE"}
+        self.assertEqual({name: found["subject"] for name, found in notes.items()},
+                         {"OUTPUT_MUTED": "sound", "SCENE_MUTED": other.name})
+        page = (ROOT / "docs/troubleshoot.md").read_text()
+        for name, found in notes.items():
+            meaning, repair = re.search(rf"(?m)^\| {name} \| (.*) \| (.*) \|$", page).groups()
+            self.assertTrue(found["text"].endswith(f": {meaning}; {repair}"), found["text"])
+            explained = json.loads(self.daemon.command("--json", "explain", name).stdout)
+            self.assertEqual((explained["meaning"], explained["repair"]), (meaning, repair))
 
     def test_it_finds_a_database_that_was_moved_away(self):
         (self.folder / "data/carillon.db").rename(self.folder / "data/away.db")

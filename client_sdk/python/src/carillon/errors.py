@@ -20,7 +20,7 @@ TOO_LARGE = re.compile(r"Received message larger than max \((\d+) vs\.? (\d+)\)"
 
 
 class CarillonError(Exception):
-    """A refusal. `reason` is stable and one of proto/README.md's; `message` is a sentence that says what was wrong,
+    """A refusal. `reason` is stable and one of proto/errors.md's; `message` is a sentence that says what was wrong,
     where, and how to repair it; `metadata` has figures that belong to the reason; `remedies` are changes to the
     request that may help, the most promising first: each has a `field` of CreateModalModelRequest, a `value` in
     protobuf's text form (empty: the caller chooses), the command line's `option`, and its `effect` in words."""
@@ -43,7 +43,7 @@ class ServerUnavailable(CarillonError):
 
 class ContactWarning(UserWarning):
     """Contacts probably do not sound as they were meant: they were late, lost or rejected, lie far from their objects,
-    and the like. `id` is stable and one of proto/README.md's; `count` is the number of contacts or steps, and `figures`
+    and the like. `id` is stable and one of proto/errors.md's; `count` is the number of contacts or steps, and `figures`
     belong to the warning."""
 
     def __init__(self, warning: warning_pb2.Warning):

@@ -54,7 +54,7 @@ def contacts(bodies: Mapping[str, Body], times: Sequence[float], poses: Mapping[
     """Finds the contacts that explain how `bodies` move. `poses` has for each body its positions in metres (F, 3) and
     orientations w, x, y, z (F, 4) at the `times` in seconds, which are equally far apart. `floor` is the height of an
     endless floor. The daemon at `server` makes the models of the bodies. Raises CarillonError, with the reasons of
-    proto/README.md, such as MOTION_UNEXPLAINED; with `force` only if nothing can be computed. Needs NumPy."""
+    proto/errors.md, such as MOTION_UNEXPLAINED; with `force` only if nothing can be computed. Needs NumPy."""
     import numpy
     names = list(bodies)
     words: list[str] = ["--gravity", ",".join(map(str, gravity))]
