@@ -41,7 +41,7 @@ function travelSpeed(contact) {
 
 /**
  * Turns the contacts of an engine into what a step of a stream or trace takes, in the scene's frame. `settings` has
- * `roughness` ({ depth, irregularity_length_m }) and `striker`, the name of what bodies without a sound are made of.
+ * `roughness` ({ depth, irregularityLengthM }) and `striker`, the name of what bodies without a sound are made of.
  */
 class ContactRows {
   constructor(settings = {}) {
@@ -85,14 +85,14 @@ class ContactRows {
     }
     const row = { object: one, partner: this.partnerNumber(second.key), point, impulse };
     if (this.settings.roughness) {
-      const { depth, irregularity_length_m } = this.settings.roughness;
-      row.roughness = { depth, travel_speed_m_per_s: travelSpeed(contact) };
-      if (irregularity_length_m !== undefined) row.roughness.irregularity_length_m = irregularity_length_m;
+      const { depth, irregularityLengthM } = this.settings.roughness;
+      row.roughness = { depth, travelSpeedMPerS: travelSpeed(contact) };
+      if (irregularityLengthM !== undefined) row.roughness.irregularityLengthM = irregularityLengthM;
     }
     if (other !== undefined) {
       row.second = { object: other, point: pointOnSecond };
     } else {
-      row.striker = { striker: this.settings.striker ?? '', striker_mass_kg: second.massKg ?? IMMOVABLE_KG };
+      row.striker = { striker: this.settings.striker ?? '', strikerMassKg: second.massKg ?? IMMOVABLE_KG };
     }
     return [row];
   }

@@ -22,7 +22,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 GENERATOR = "@grpc/proto-loader/build/bin/proto-loader-gen-types.js"
 # As lib/contract.js loads the files.
-LOADING = ("--keepCase", "--longs=Number", "--enums=String", "--defaults", "--oneofs", "--includeComments")
+LOADING = ("--longs=Number", "--enums=String", "--defaults", "--oneofs", "--includeComments")
 
 
 def refuse(text):

@@ -20,7 +20,7 @@ async function main() {
   const seconds = Number(options.seconds ?? scene.seconds ?? 2);
   if (!(seconds >= 0)) throw new Error(`--seconds ${options.seconds} is no time`);
   const { roughness_depth: depth, irregularity_length_m: irregularity } = scene;
-  const settings = depth ? { roughness: { depth, irregularity_length_m: irregularity } } : {};
+  const settings = depth ? { roughness: { depth, irregularityLengthM: irregularity } } : {};
   const fall = await require(`./${options.engine}_fall`).start(scene, 1 / rate, settings);
   const trace = new carillon.Trace({ frame: 'scene', step: 1 / rate, simulator: `fall.js ${options.engine}` });
   scene.bodies.forEach((body, i) => {

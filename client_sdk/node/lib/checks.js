@@ -32,11 +32,12 @@ function nearest(word, names) {
 
 function hint(name, known) {
   const names = known.filter((right) => !right.startsWith('_')); // without those that only the daemon uses
-  const near = nearest(name, names);
+  // The contract writes max_frequency_hz where this package has maxFrequencyHz.
+  const near = nearest(name.replace(/_([a-z])/g, (_, letter) => letter.toUpperCase()), names);
   return near === undefined ? `it has ${names.sort().join(', ')}` : `did you mean "${near}"?`;
 }
 
-/** How a caller gives a field of the messages within a message, such as "settings: { poisson_ratio: ... }". */
+/** How a caller gives a field of the messages within a message, such as "settings: { poissonRatio: ... }". */
 function places(type, name) {
   const found = [];
   for (const field of message(type).type.field) {

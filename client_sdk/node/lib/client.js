@@ -25,9 +25,9 @@ const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
 /** The fields of ListJobsRequest and WatchJobsRequest for states such as 'failed'. */
 function jobFilter(filters) {
-  refuseUnknown(filters, ['states', 'label_contains'], 'jobs');
-  const { states = [], label_contains = '' } = filters;
-  return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), label_contains };
+  refuseUnknown(filters, ['states', 'labelContains'], 'jobs');
+  const { states = [], labelContains = '' } = filters;
+  return { states: states.map((state) => choice(state, JOB_STATES, 'JOB_STATE_', 'an entry of states')), labelContains };
 }
 
 /** The methods of this package for those of the contract that have streams. */
@@ -126,7 +126,7 @@ class Client {
     return new Promise((resolve, reject) => {
       const stream = this.stub('ModalModelService').UploadMesh((error, answer) => {
         if (error) reject(fromCall(error, this.server));
-        else resolve(answer.mesh_digest);
+        else resolve(answer.meshDigest);
       });
       for (let at = 0; at < file.data.length; at += PIECE_BYTES) {
         stream.write({ data: file.data.subarray(at, at + PIECE_BYTES) });
@@ -138,7 +138,7 @@ class Client {
   /**
    * Returns the model of a mesh, which is computed if the daemon does not have it. `unit` is that of its coordinates:
    * 'm', 'cm', 'mm', 'in', or a number of metres. `accuracy` is the largest estimated error of a frequency, such as 0.01
-   * for 1 %. The request may have other fields of CreateModalModelRequest, such as size, settings, max_frequency_hz or
+   * for 1 %. The request may have other fields of CreateModalModelRequest, such as size, settings, maxFrequencyHz or
    * priority. The name of a material may come before it: createModel(mesh, 'oak', { unit: 'mm' }).
    */
   async createModel(mesh, wanted, more) {
@@ -149,8 +149,8 @@ class Client {
     Object.assign(own, given('settings', toSettings(request.settings, unit, accuracy)));
     const file = await toMeshFile(mesh);
     const { job } = await this.call('ModalModelService', 'CreateModalModel', { ...own,
-      mesh_digest: await this.uploadFile(file), mesh_format: file.format, label: label ?? file.label });
-    const model = await this.model((await this.watch(job, onProgress)).modal_model, material);
+      meshDigest: await this.uploadFile(file), meshFormat: file.format, label: label ?? file.label });
+    const model = await this.model((await this.watch(job, onProgress)).modalModel, material);
     warnOfLabel(model.label, label);
     return model;
   }
@@ -180,13 +180,13 @@ class Client {
     return newest;
   }
 
-  /** Yields the jobs that match, newest first; filters are `states`, such as 'failed', and `label_contains`. */
+  /** Yields the jobs that match, newest first; filters are `states`, such as 'failed', and `labelContains`. */
   async* jobs(filters = {}) {
-    for (let page_token = ''; ;) {
-      const page = await this.call('DecompositionService', 'ListJobs', { ...jobFilter(filters), page_token });
+    for (let pageToken = ''; ;) {
+      const page = await this.call('DecompositionService', 'ListJobs', { ...jobFilter(filters), pageToken });
       yield* page.jobs;
-      page_token = page.next_page_token;
-      if (!page_token) return;
+      pageToken = page.nextPageToken;
+      if (!pageToken) return;
     }
   }
 
@@ -206,17 +206,17 @@ class Client {
     }
     const name = text.startsWith(MODELS) ? text : await this.find(text);
     const answer = await this.call('ModalModelService', 'GetModalModel', { name });
-    return new Model(this, answer.modal_model, material ?? answer.modal_model.material ?? undefined);
+    return new Model(this, answer.modalModel, material ?? answer.modalModel.material ?? undefined);
   }
 
   /** Yields the models that match, newest first; filters are fields of ListModalModelsRequest. */
   async* models(filters = {}) {
     refuseNoMessage(filters, 'ListModalModelsRequest', 'models');
-    for (let page_token = ''; ;) {
-      const page = await this.call('ModalModelService', 'ListModalModels', { ...filters, page_token });
-      for (const summary of page.modal_models) yield new Model(this, summary, summary.material ?? undefined);
-      page_token = page.next_page_token;
-      if (!page_token) return;
+    for (let pageToken = ''; ;) {
+      const page = await this.call('ModalModelService', 'ListModalModels', { ...filters, pageToken });
+      for (const summary of page.modalModels) yield new Model(this, summary, summary.material ?? undefined);
+      pageToken = page.nextPageToken;
+      if (!pageToken) return;
     }
   }
 
@@ -251,7 +251,7 @@ class Client {
 
   /** Fades out all that sounds in your scenes. Returns their number. */
   async stopAll() {
-    return (await this.call('SceneService', 'StopAll', {})).scene_count;
+    return (await this.call('SceneService', 'StopAll', {})).sceneCount;
   }
 
   /**
@@ -314,12 +314,12 @@ class Client {
       else if (answer.response === 'blows') blows.push(...answer.blows.blows);
       else summary = answer.summary;
     }
-    if (summary.rejected_count) throw fromInfo(summary.last_rejection);
+    if (summary.rejectedCount) throw fromInfo(summary.lastRejection);
     const empty = summary.warnings.find(({ id }) => id === 'TRACE_EMPTY');
     if (empty) throw new CarillonError(empty.id, empty.text);
     warnOfContacts(summary.warnings);
-    if (summary.paper_coupling_object_count) await this.warnOfTransfers(whole.objects.map((object) => object.modal_model));
-    return new Sound(samplesOf(pieces), format.sample_rate_hz, format.channel_count, summary, blows);
+    if (summary.paperCouplingObjectCount) await this.warnOfTransfers(whole.objects.map((object) => object.modalModel));
+    return new Sound(samplesOf(pieces), format.sampleRateHz, format.channelCount, summary, blows);
   }
 
   /** Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning. */
@@ -327,7 +327,7 @@ class Client {
     const labels = [];
     try {
       for await (const job of this.jobs({ states: ['queued', 'running'] })) {
-        if (isTransfer(job) && models.includes(job.modal_model)) labels.push(job.label || job.name);
+        if (isTransfer(job) && models.includes(job.modalModel)) labels.push(job.label || job.name);
       }
     } catch (error) {
       if (!(error instanceof CarillonError)) throw error;
@@ -337,7 +337,7 @@ class Client {
 
   /**
    * Begins to record what the daemon plays. Returns once it does. `request` has fields of ListenRequest: scene,
-   * block_frame_count and encoding.
+   * blockFrameCount and encoding.
    */
   async listen(request = {}) {
     refuseNoMessage(request, 'ListenRequest', 'listen');
@@ -379,7 +379,7 @@ class Recording {
     if (done) return false;
     this.pieces.push(value.block.samples);
     this.byteCount += value.block.samples.length;
-    this.lostFrameCount = value.lost_frame_count;
+    this.lostFrameCount = value.lostFrameCount;
     return true;
   }
 
@@ -389,7 +389,7 @@ class Recording {
     this.pieces = [heard.subarray(byteCount)];
     this.byteCount = this.pieces[0].length;
     const samples = this.isShort ? samplesOfIntegers : samplesOf;
-    const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
+    const { sampleRateHz: rateHz, channelCount } = this.format;
     return new Sound(samples([heard.subarray(0, byteCount)]), rateHz, channelCount);
   }
 
@@ -404,7 +404,7 @@ class Recording {
    */
   async take(seconds) {
     if (!(seconds > 0 && seconds < Infinity)) refuse(seconds, 'seconds', 'a number above 0');
-    const { sample_rate_hz: rateHz, channel_count: channelCount } = this.format;
+    const { sampleRateHz: rateHz, channelCount } = this.format;
     const wanted = Math.floor(seconds * rateHz) * channelCount * (this.isShort ? 2 : 4);
     while (this.byteCount < wanted && await this.hear());
     return this.cut(wanted);

@@ -33,11 +33,11 @@ const ROUGH_COLUMNS = ['travelSpeeds', 'roughnessDepth', 'irregularityLength'];
 // The kinds of contacts in a step: of each the kind in the contract, the vector of a row and of columns, the field of
 // that vector, and what else rows and columns may have.
 const KINDS = {
-  contacts: { kind: 'CONTACT_KIND_REPORTED', vector: 'impulse', vectors: 'impulses', field: 'impulse_newton_seconds',
+  contacts: { kind: 'CONTACT_KIND_REPORTED', vector: 'impulse', vectors: 'impulses', field: 'impulseNewtonSeconds',
     row: [...COLLISION, 'partner', 'roughness'], columns: [...COLLISIONS, 'partners', ...ROUGH_COLUMNS] },
-  impacts: { kind: 'CONTACT_KIND_IMPACT', vector: 'impulse', vectors: 'impulses', field: 'impulse_newton_seconds',
+  impacts: { kind: 'CONTACT_KIND_IMPACT', vector: 'impulse', vectors: 'impulses', field: 'impulseNewtonSeconds',
     row: COLLISION, columns: COLLISIONS },
-  forces: { kind: 'CONTACT_KIND_FORCE', vector: 'force', vectors: 'forces', field: 'force_newtons',
+  forces: { kind: 'CONTACT_KIND_FORCE', vector: 'force', vectors: 'forces', field: 'forceNewtons',
     row: ['roughness'], columns: ROUGH_COLUMNS },
 };
 
@@ -70,10 +70,10 @@ function quaternion(values, name) {
 function toPose(pose, name = 'pose') {
   if (pose === undefined || pose === null) return undefined;
   if (typeof pose !== 'object') refuse(pose, name, POSE);
-  if ('length' in pose) return { position_m: vector(pose, name, "metres in the scene's frame") };
+  if ('length' in pose) return { positionM: vector(pose, name, "metres in the scene's frame") };
   refuseUnknown(pose, ['position', 'orientation'], name);
   const { position, orientation } = pose;
-  return { position_m: vector(position, `the position of ${name}`, "metres in the scene's frame"),
+  return { positionM: vector(position, `the position of ${name}`, "metres in the scene's frame"),
     ...given('orientation', orientation && quaternion(orientation, `the orientation of ${name}`)) };
 }
 
@@ -148,17 +148,17 @@ function numbers(values, count, name, read = number) {
 function contactColumns(columns, name) {
   const { kind, vectors, field, columns: keys } = KINDS[name];
   refuseUnknown(columns, ['objects', 'points', vectors, ...SECOND_COLUMNS, ...keys], name);
-  const point_m = table(columns.points, 'points');
+  const pointM = table(columns.points, 'points');
   const values = table(columns[vectors], vectors);
-  if (point_m.length !== values.length) {
-    throw new RangeError(`points has the numbers of ${counted(point_m.length / 3, 'contact')} and ${vectors} has those of ` +
+  if (pointM.length !== values.length) {
+    throw new RangeError(`points has the numbers of ${counted(pointM.length / 3, 'contact')} and ${vectors} has those of ` +
       `${values.length / 3}; each contact needs both`);
   }
-  const count = point_m.length / 3;
+  const count = pointM.length / 3;
   const { roughnessDepth, irregularityLength } = columns;
   refuseNoNumbers({ roughnessDepth, irregularityLength }, name);
-  return { kind, object: handles(columns.objects, count), point_m, [field]: values, ...numberColumns(columns, count),
-    ...present({ roughness_depth: roughnessDepth, irregularity_length_m: irregularityLength }),
+  return { kind, object: handles(columns.objects, count), pointM, [field]: values, ...numberColumns(columns, count),
+    ...present({ roughnessDepth, irregularityLengthM: irregularityLength }),
     ...secondColumns(columns, count), ...given('hertz', toStriker(columns.striker)) };
 }
 
@@ -167,28 +167,28 @@ function numberColumns({ durations, timeOffsets, partners, travelSpeeds }, count
   const made = {};
   // A duration below zero is absent.
   if (durations !== undefined) {
-    made.duration_s = numbers(durations, count, 'durations', (value, name) => durationOf(value, name) ?? -1);
+    made.durationS = numbers(durations, count, 'durations', (value, name) => durationOf(value, name) ?? -1);
   }
-  if (timeOffsets !== undefined) made.time_offset_s = numbers(timeOffsets, count, 'timeOffsets');
+  if (timeOffsets !== undefined) made.timeOffsetS = numbers(timeOffsets, count, 'timeOffsets');
   if (partners !== undefined) {
     made.partner = numbers(partners, count, 'partners', (value, name) => whole(value, name, PARTNER));
   }
-  if (travelSpeeds !== undefined) made.travel_speed_m_per_s = numbers(travelSpeeds, count, 'travelSpeeds');
+  if (travelSpeeds !== undefined) made.travelSpeedMPerS = numbers(travelSpeeds, count, 'travelSpeeds');
   return made;
 }
 
 function secondColumns({ secondObjects, secondPoints, secondRotations }, count) {
   if (secondObjects === undefined) return {};
-  return { second_object: handles(secondObjects, count, 'secondObjects'),
-    second_point_m: table(secondPoints, 'secondPoints'),
-    ...given('second_rotation', secondRotations && table(secondRotations, 'secondRotations', 4)) };
+  return { secondObject: handles(secondObjects, count, 'secondObjects'),
+    secondPointM: table(secondPoints, 'secondPoints'),
+    ...given('secondRotation', secondRotations && table(secondRotations, 'secondRotations', 4)) };
 }
 
 function secondObject(second, where) {
   if (!second) return second;
   refuseUnknown(second, ['object', 'point', 'rotation'], `second of ${where}`);
   return { object: handleOf(second.object, `object of second of ${where}`),
-    point_m: vector(second.point, `point of second of ${where}`, MEANINGS.secondPoints),
+    pointM: vector(second.point, `point of second of ${where}`, MEANINGS.secondPoints),
     ...given('rotation', second.rotation && quaternion(second.rotation, `rotation of second of ${where}`)) };
 }
 
@@ -202,19 +202,19 @@ function contactRow(row, name, where) {
   const { kind, vector: key, vectors, field, row: keys } = KINDS[name];
   refuseUnknown(row, ['object', 'point', key, 'second', ...keys], where);
   refuseNoNumbers({ timeOffset: row.timeOffset }, where);
-  return { kind, ...present({ object: handleOf(row.object, `object of ${where}`), time_offset_s: row.timeOffset,
+  return { kind, ...present({ object: handleOf(row.object, `object of ${where}`), timeOffsetS: row.timeOffset,
     partner: partnerOf(row.partner, `partner of ${where}`) }),
-  point_m: vector(row.point, `point of ${where}`, MEANINGS.points),
+  pointM: vector(row.point, `point of ${where}`, MEANINGS.points),
   [field]: vector(row[key], `${key} of ${where}`, MEANINGS[vectors]),
-  ...given('duration_s', durationOf(row.duration, `duration of ${where}`)),
+  ...given('durationS', durationOf(row.duration, `duration of ${where}`)),
   ...given('roughness', toRoughness(row.roughness, where)), ...given('hertz', toStriker(row.striker)),
   ...given('second', secondObject(row.second, where)) };
 }
 
 function poseColumns(columns) {
   refuseUnknown(columns, ['objects', 'positions', 'orientations'], 'poses');
-  const position_m = table(columns.positions, 'positions');
-  const made = { object: handles(columns.objects, position_m.length / 3), position_m };
+  const positionM = table(columns.positions, 'positions');
+  const made = { object: handles(columns.objects, positionM.length / 3), positionM };
   if (columns.orientations) made.orientation = table(columns.orientations, 'orientations', 4);
   return made;
 }
@@ -227,14 +227,14 @@ function makeStep(time, own) {
   const content = own ?? {};
   if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
   refuseUnknown(content, STEP_KEYS, 'step');
-  const step = present({ time_s: time });
+  const step = present({ timeS: time });
   for (const name of Object.keys(KINDS)) {
     const contacts = content[name];
     if (Array.isArray(contacts)) {
       const rows = contacts.map((row, i) => contactRow(row, name, `${name}[${i}]`));
       step.contacts = [...step.contacts ?? [], ...rows];
     } else if (contacts) {
-      step.contact_columns = [...step.contact_columns ?? [], contactColumns(contacts, name)];
+      step.contactColumns = [...step.contactColumns ?? [], contactColumns(contacts, name)];
     }
   }
   if (content.listener) step.listener = toPose(content.listener, 'listener');
@@ -258,8 +258,8 @@ function refuseTime(time, number, before, repair) {
 }
 
 /** The number of contacts and poses of a step. */
-function countRows({ contacts, contact_columns, poses }) {
-  const lists = [contacts, poses?.object, ...(contact_columns ?? []).map((columns) => columns.object)];
+function countRows({ contacts, contactColumns, poses }) {
+  const lists = [contacts, poses?.object, ...(contactColumns ?? []).map((columns) => columns.object)];
   return lists.reduce((count, list) => count + (list?.length ?? 0), 0);
 }
 

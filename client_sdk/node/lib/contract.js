@@ -11,9 +11,9 @@ const own = path.join(__dirname, '..', 'proto');
 const folder = fs.existsSync(own) ? own : path.join(__dirname, '..', '..', '..', 'proto');
 const files = fs.readdirSync(path.join(folder, 'carillon/v1')).filter((name) => name.endsWith('.proto'));
 
-// Fields have the names of the contract, and 64-bit numbers, which are counts and frames here, are numbers.
+// Fields have the names of the contract in camelCase, and 64-bit numbers, which are counts and frames here, are numbers.
 const definition = protoLoader.loadSync(files.map((name) => path.join('carillon/v1', name)), {
-  includeDirs: [folder], keepCase: true, longs: Number, enums: String, defaults: true, oneofs: true,
+  includeDirs: [folder], longs: Number, enums: String, defaults: true, oneofs: true,
 });
 
 /** The constructors of the services' clients by name. */

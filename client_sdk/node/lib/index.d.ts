@@ -202,7 +202,7 @@ export class Sound {
   readonly channelCount: number;
   /** What the daemon measured while it rendered the sound offline. */
   readonly summary?: RenderSummary__Output;
-  /** The impulses that sounded, if the settings had tell_blows. */
+  /** The impulses that sounded, if the settings had tellBlows. */
   readonly blows: Blow__Output[];
   readonly seconds: number;
   readonly peak: number;
@@ -299,7 +299,7 @@ export class Scene {
 export class ContactStream {
   /**
    * The daemon's newest answer, with the counts so far. It counts an impulse as accepted before it sounds: one that is
-   * due after the scene is deleted is never heard. Wait for `ahead_s`, in seconds, after the end of the stream.
+   * due after the scene is deleted is never heard. Wait for `aheadS`, in seconds, after the end of the stream.
    */
   readonly report?: StreamContactsResponse__Output;
   /** Steps that were not sent: the oldest ones, when 4096 waited. The warning of `close` tells their number, too. */
@@ -350,11 +350,11 @@ export class Recording {
 export interface JobFilters {
   states?: Array<'queued' | 'running' | 'succeeded' | 'failed' | 'cancelled'>;
   /** Text that the label has, in upper or lower case. */
-  label_contains?: string;
+  labelContains?: string;
 }
 
 /** What a model is asked for with beside its material. */
-export type ModelRequest = Omit<CreateModalModelRequest, 'material' | 'mesh_digest' | 'mesh_format'> & {
+export type ModelRequest = Omit<CreateModalModelRequest, 'material' | 'meshDigest' | 'meshFormat'> & {
   unit?: 'm' | 'cm' | 'mm' | 'in' | number; accuracy?: number; onProgress?: (job: Job__Output) => void;
 };
 

@@ -7,7 +7,7 @@ const { choice, refuse, refuseNoMessage } = require('./checks');
 function toMaterial(material) {
   if (typeof material === 'string') return { preset: material };
   if (material === null || typeof material !== 'object') {
-    refuse(material, 'material', "a name such as 'oak', or figures such as { young_pa, density_kg_per_m3 }");
+    refuse(material, 'material', "a name such as 'oak', or figures such as { youngPa, densityKgPerM3 }");
   }
   refuseNoMessage(material, 'Material', 'material');
   return material;
@@ -21,7 +21,7 @@ function named(model, material) {
   const name = typeof model === 'string' ? model : model?.name;
   if (typeof name !== 'string' || !name) refuse(model, 'the model', 'a Model, such as await createModel(...), or its name');
   const chosen = material ?? (typeof model === 'string' ? undefined : model.material);
-  return chosen === undefined ? { modal_model: name } : { modal_model: name, material: toMaterial(chosen) };
+  return chosen === undefined ? { modalModel: name } : { modalModel: name, material: toMaterial(chosen) };
 }
 
 /** "radiated_power" becomes the name in the contract. */

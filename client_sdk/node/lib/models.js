@@ -26,7 +26,7 @@ class Model {
   }
 
   get modeCount() {
-    return this.summary.header.mode_count;
+    return this.summary.header.modeCount;
   }
 
   /**
@@ -54,7 +54,7 @@ class Model {
   async transferJobs() {
     const found = [];
     for await (const job of this.client.jobs({ states: ['queued', 'running', 'failed', 'cancelled'] })) {
-      if (isTransfer(job) && job.modal_model === this.name) found.push(job);
+      if (isTransfer(job) && job.modalModel === this.name) found.push(job);
     }
     const awaited = found.filter((job) => ['JOB_STATE_QUEUED', 'JOB_STATE_RUNNING'].includes(job.state));
     if (awaited.length) return awaited;
@@ -73,7 +73,7 @@ class Model {
     const trace = new Trace({ simulator: 'carillon (Node)' });
     const object = trace.add(this, { material, size, gain });
     trace.step(0, { impacts: strikeOf(object, strike) });
-    return this.client.render(trace, { tail_s: seconds, sample_rate_hz: sampleRateHz });
+    return this.client.render(trace, { tailS: seconds, sampleRateHz });
   }
 
   [util.inspect.custom]() {

@@ -23,7 +23,7 @@ function toMicrophone(microphone) {
   refuseUnknown(microphone, ['kind', 'order', 'pose', 'on'], 'a microphone');
   const { kind = 'omni', order, pose, on } = microphone;
   if (!KINDS.includes(kind)) refuse(kind, 'kind of a microphone', KINDS.map((name) => `'${name}'`).join(', '));
-  return { kind: `MICROPHONE_KIND_${kind.toUpperCase()}`, ...present({ ambisonic_order: order, object: toHandle(on) }),
+  return { kind: `MICROPHONE_KIND_${kind.toUpperCase()}`, ...present({ ambisonicOrder: order, object: toHandle(on) }),
     ...given('pose', toPose(pose)) };
 }
 
@@ -43,8 +43,8 @@ class Performance {
     const { step, environments = 1, microphones = [], latency, sampleRateHz, fullScalePa, hearing, tellImpacts } = own;
     refuseNoNumbers({ step, environments, latency, sampleRateHz, fullScalePa }, 'perform');
     if (hearing) refuseNoMessage(hearing, 'Hearing', 'hearing');
-    this.settings = { ...present({ step_s: step, environment_count: environments, latency_s: latency,
-      sample_rate_hz: sampleRateHz, full_scale_pa: fullScalePa, tell_impacts: tellImpacts }),
+    this.settings = { ...present({ stepS: step, environmentCount: environments, latencyS: latency,
+      sampleRateHz, fullScalePa, tellImpacts }),
     microphones: microphones.map(toMicrophone), ...given('hearing', hearing),
     ...streamSettings({ frame: own.frame, pulseShape: own.pulseShape }) };
     this.client = client;
@@ -59,9 +59,9 @@ class Performance {
     this.client.openCalls.add(this.call);
     this.answers = this.call[Symbol.asyncIterator]();
     const { begun } = await this.ask({ settings: this.settings });
-    this.sampleRateHz = begun.sample_rate_hz;
-    this.channelCount = begun.channel_count;
-    this.latency = begun.latency_frames / begun.sample_rate_hz;
+    this.sampleRateHz = begun.sampleRateHz;
+    this.channelCount = begun.channelCount;
+    this.latency = begun.latencyFrames / begun.sampleRateHz;
     return this;
   }
 
@@ -90,7 +90,7 @@ class Performance {
     const { environments, material, size = 1, gain = 1, pose, handle, radiation } = settings;
     refuseNoNumbers({ size, gain }, 'add');
     this.handle = toHandle(handle) || this.handle + 1;
-    this.next.added_objects = [...this.next.added_objects ?? [], {
+    this.next.addedObjects = [...this.next.addedObjects ?? [], {
       object: { handle: this.handle, ...named(model, material), size, gain, ...given('pose', toPose(pose)),
         ...present({ radiation: toRadiation(radiation) }) },
       environments: indices(environments) }];
@@ -99,7 +99,7 @@ class Performance {
 
   /** Removes an object from the environments, by default from all, at the next step. Its sound fades out within 10 ms. */
   remove(object, environments) {
-    this.next.removed_objects = [...this.next.removed_objects ?? [],
+    this.next.removedObjects = [...this.next.removedObjects ?? [],
       { object: toHandle(object), environments: indices(environments) }];
   }
 
@@ -129,15 +129,15 @@ class Performance {
     if (content.poses) step.poses = withEnvironments(content.poses, poseColumns);
     let { samples: answer } = await this.ask({ step });
     const pieces = [answer.samples];
-    while (!answer.is_last) {
+    while (!answer.isLast) {
       ({ samples: answer } = await this.receive());
       pieces.push(answer.samples);
     }
-    if (answer.rejected_count > this.rejectedCount) {
-      this.rejectedCount = answer.rejected_count;
-      throw fromInfo(answer.last_rejection);
+    if (answer.rejectedCount > this.rejectedCount) {
+      this.rejectedCount = answer.rejectedCount;
+      throw fromInfo(answer.lastRejection);
     }
-    return { samples: samplesOf(pieces), frameCount: answer.frame_count, impacts: answer.impacts };
+    return { samples: samplesOf(pieces), frameCount: answer.frameCount, impacts: answer.impacts };
   }
 
   /** Ends the performance. */

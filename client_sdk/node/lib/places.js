@@ -10,7 +10,7 @@ const PAUSES_MS = Array.from({ length: 8 }, (_, i) => 10 * 2 ** i);
 /** Returns how many renderings the daemon lets one client have at a time. */
 async function mostRenderings(client) {
   const { limits } = await client.info();
-  return Math.max(1, Math.floor(limits.rendering_count * limits.client_share));
+  return Math.max(1, Math.floor(limits.renderingCount * limits.clientShare));
 }
 
 /** Some places. Who finds none waits for the next that is given back. */

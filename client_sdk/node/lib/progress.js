@@ -6,7 +6,7 @@ const { counted } = require('./checks');
 
 /** Why a job waits, in the words of the command line. */
 function waitText(wait) {
-  const { cause, earlier_job_count: earlier, running_job_count: count, running_job_label: label } = wait ?? {};
+  const { cause, earlierJobCount: earlier, runningJobCount: count, runningJobLabel: label } = wait ?? {};
   if (earlier > 0) return `waiting: ${counted(earlier, 'job')} ${earlier === 1 ? 'is' : 'are'} before it`;
   const running = count === 1 ? label || 'a job' : counted(count, 'job');
   if (cause === 'WAIT_CAUSE_WORKER') return `waiting for ${count === 1 ? '' : 'one of '}${running}`;

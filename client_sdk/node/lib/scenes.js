@@ -51,14 +51,14 @@ class SoundingObject {
     refuseUnknown(changes, [...OBJECT_KEYS, 'glide'], 'update');
     const { material, size, gain, pose, glide = 0, radiation } = changes;
     refuseNoNumbers({ size, gain, glide }, 'update');
-    const request = { name: this.name, glide_s: glide, ...given('material', material && toMaterial(material)),
+    const request = { name: this.name, glideS: glide, ...given('material', material && toMaterial(material)),
       ...given('size', size), ...given('gain', gain), ...given('pose', toPose(pose)),
       ...present({ radiation: toRadiation(radiation) }) };
     this.message = (await this.scene.client.call('SceneService', 'UpdateObject', request)).object;
   }
 
   [util.inspect.custom]() {
-    const { handle, sounding_mode_count: count, lowest_frequency_hz: low, highest_frequency_hz: high } = this.message;
+    const { handle, soundingModeCount: count, lowestFrequencyHz: low, highestFrequencyHz: high } = this.message;
     return `<SoundingObject ${handle}: ${counted(count, 'mode')}, ${low.toFixed(1)} to ${high.toFixed(1)} Hz>`;
   }
 
@@ -146,7 +146,7 @@ class Scene {
   /** Moves the listener, within `glide` seconds. */
   async moveListener(pose, glide = 0) {
     refuseNoNumbers({ glide }, 'moveListener');
-    await this.client.call('SceneService', 'UpdateListener', { scene: this.name, pose: toPose(pose), glide_s: glide });
+    await this.client.call('SceneService', 'UpdateListener', { scene: this.name, pose: toPose(pose), glideS: glide });
   }
 
   /** Opens a stream for the contacts of a simulation whose steps last `step` seconds. */
@@ -154,7 +154,7 @@ class Scene {
     refuseUnknown(own, ['step', 'delay', 'frame', 'pulseShape'], 'stream');
     const { step, delay, ...settings } = own;
     refuseNoNumbers({ step, delay }, 'stream');
-    return new ContactStream(this, { scene: this.name, step_s: step, ...given('scheduling_delay_s', delay),
+    return new ContactStream(this, { scene: this.name, stepS: step, ...given('schedulingDelayS', delay),
       ...streamSettings(settings) });
   }
 
@@ -179,7 +179,7 @@ function refuseOtherScenes(content, scene) {
 
 /**
  * Sends the contacts of each step. `report` is the daemon's newest answer, with the counts so far. It counts an impulse
- * as accepted before it sounds: one that is due after the scene is deleted is never heard, for which `report.ahead_s`
+ * as accepted before it sounds: one that is due after the scene is deleted is never heard, for which `report.aheadS`
  * says how long to wait after the end. `droppedStepCount` steps were not sent: the oldest ones, when 4096 waited. When it
  * is closed, a warning of the process, a ContactWarning, tells of each fact in `warnings`.
  */
@@ -242,7 +242,7 @@ class ContactStream {
     return this.waiting.splice(0, count);
   }
 
-  /** What the daemon found out about the contacts so far, such as blow_count. */
+  /** What the daemon found out about the contacts so far, such as blowCount. */
   get findings() {
     return this.report?.findings ?? undefined;
   }
@@ -261,21 +261,21 @@ class ContactStream {
 
   /** Why the newest rejected contact was rejected; undefined if none was so far. */
   get rejection() {
-    return this.report?.rejected_count ? fromInfo(this.report.last_rejection) : undefined;
+    return this.report?.rejectedCount ? fromInfo(this.report.lastRejection) : undefined;
   }
 
   /** How many contacts came too late for their time so far, and sounded at once. */
   get lateCount() {
-    return this.report?.late_count ?? 0;
+    return this.report?.lateCount ?? 0;
   }
 
   /** How many times simulation time was mapped anew so far, because every step was late. */
   get remapCount() {
-    return this.report?.remap_count ?? 0;
+    return this.report?.remapCount ?? 0;
   }
 
   [util.inspect.custom]() {
-    const { step_count: steps = 0, accepted_count: accepted = 0, rejected_count: rejected = 0 } = this.report ?? {};
+    const { stepCount: steps = 0, acceptedCount: accepted = 0, rejectedCount: rejected = 0 } = this.report ?? {};
     return `<ContactStream of ${this.start.scene}: ${counted(steps, 'step')}, ${counted(accepted, 'contact')} in time, ` +
       `${this.lateCount} late, ${rejected} rejected>`;
   }

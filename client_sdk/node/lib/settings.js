@@ -22,8 +22,8 @@ function refuseTwice(name, field, value) {
 function toSettings(settings, unit, accuracy) {
   const made = { ...settings };
   if (unit !== undefined) {
-    refuseTwice('unit', 'metres_per_unit', made.metres_per_unit);
-    made.metres_per_unit = metresOf(unit);
+    refuseTwice('unit', 'metresPerUnit', made.metresPerUnit);
+    made.metresPerUnit = metresOf(unit);
   }
   if (accuracy !== undefined) {
     refuseTwice('accuracy', 'mesh.accuracy', made.mesh?.accuracy);

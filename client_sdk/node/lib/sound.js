@@ -9,7 +9,7 @@ const FULL_SCALE = 2 ** 23 - 1;
 
 /**
  * Samples as a Float32Array, interleaved by channel; full scale is 1. `summary` is what the daemon measured while it
- * rendered the sound offline. `blows` are the impulses that sounded, if the settings had tell_blows.
+ * rendered the sound offline. `blows` are the impulses that sounded, if the settings had tellBlows.
  */
 class Sound {
   constructor(samples, sampleRateHz, channelCount, summary, blows = []) {

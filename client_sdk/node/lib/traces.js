@@ -14,7 +14,7 @@ const FORMAT_VERSION = 1;
 /** "scene" becomes FRAME_SCENE, "gaussian" PULSE_SHAPE_GAUSSIAN. */
 function streamSettings({ frame, pulseShape }) {
   return present({ frame: choice(frame, ['object', 'scene'], 'FRAME_', 'frame'),
-    pulse_shape: choice(pulseShape, ['raised_cosine', 'gaussian'], 'PULSE_SHAPE_', 'pulseShape') });
+    pulseShape: choice(pulseShape, ['raised_cosine', 'gaussian'], 'PULSE_SHAPE_', 'pulseShape') });
 }
 
 /**
@@ -32,7 +32,7 @@ class Trace {
     for (const [name, text] of Object.entries(labels ?? {})) {
       if (typeof text !== 'string') refuse(text, `the label ${name} of Trace`, 'text');
     }
-    this.header = { format_version: FORMAT_VERSION, ...present({ simulator, step_s: step, labels }),
+    this.header = { formatVersion: FORMAT_VERSION, ...present({ simulator, stepS: step, labels }),
       ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')), ...streamSettings(settings) };
     this.objects = [];
     this.steps = [];
@@ -55,7 +55,7 @@ class Trace {
    * 86400 s.
    */
   step(time, content) {
-    if (!this.header.step_s && (content?.contacts || content?.forces || content?.poses)) {
+    if (!this.header.stepS && (content?.contacts || content?.forces || content?.poses)) {
       throw new TypeError("contacts, forces and poses need the length of the simulator's steps in seconds, as in a " +
         'stream: new Trace({ step: 1 / 240 })');
     }
@@ -67,7 +67,7 @@ class Trace {
       }
     }
     const made = makeStep(time, content);
-    refuseTime(time, this.steps.length, this.steps.at(-1)?.time_s ?? 0, 'make another trace for another run');
+    refuseTime(time, this.steps.length, this.steps.at(-1)?.timeS ?? 0, 'make another trace for another run');
     this.steps.push(made);
   }
 
@@ -80,7 +80,7 @@ class Trace {
 
   [util.inspect.custom]() {
     return `<Trace: ${counted(this.objects.length, 'object')}, ${counted(this.steps.length, 'step')}, to ` +
-      `${this.steps.at(-1)?.time_s ?? 0} s>`;
+      `${this.steps.at(-1)?.timeS ?? 0} s>`;
   }
 
   /** The bytes of a .contacts file. */
@@ -123,12 +123,12 @@ class Trace {
 
 /** The header, if this program can read what follows it. */
 function checked(header, path) {
-  if (!header.format_version) {
+  if (!header.formatVersion) {
     throw new CarillonError('TRACE_MALFORMED', `${path} does not begin with the header of a contact trace; write the ` +
       'trace again');
   }
-  if (header.format_version > FORMAT_VERSION) {
-    throw new CarillonError('TRACE_TOO_NEW', `${path} has format version ${header.format_version}, this program ` +
+  if (header.formatVersion > FORMAT_VERSION) {
+    throw new CarillonError('TRACE_TOO_NEW', `${path} has format version ${header.formatVersion}, this program ` +
       `reads ${FORMAT_VERSION}; update it`);
   }
   return header;

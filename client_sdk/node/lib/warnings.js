@@ -19,13 +19,13 @@ function warnOfLabel(label, wanted) {
   'LabelWarning');
 }
 
-// The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
+// The contract (Progress.extentM) says above which extent the unit is likely to be wrong.
 const LIKELY_EXTENT_M = 20;
 
 /** Warns if the state of a job, newer than `before`, is the first to say that the body is suspiciously large. */
 function warnOfUnit(job, before) {
-  const extent = job.progress?.extent_m ?? 0;
-  if (extent <= LIKELY_EXTENT_M || (before.progress?.extent_m ?? 0) > LIKELY_EXTENT_M) return;
+  const extent = job.progress?.extentM ?? 0;
+  if (extent <= LIKELY_EXTENT_M || (before.progress?.extentM ?? 0) > LIKELY_EXTENT_M) return;
   process.emitWarning(`the body is ${Number(extent.toPrecision(3))} m across; if its coordinates are in another unit than metres, ` +
     "cancel and give the unit, such as unit: 'mm'", 'UnitWarning');
 }

@@ -38,9 +38,9 @@ async function main() {
   }
   const report = await stream.close();
   const { user, system } = process.cpuUsage(before);
-  console.log(JSON.stringify({ seconds: elapsed(), cpu_s: (user + system) / 1e6, accepted: report.accepted_count,
-    late: report.late_count, dropped: report.dropped_count, rejected: report.rejected_count,
-    steps: report.step_count }));
+  console.log(JSON.stringify({ seconds: elapsed(), cpu_s: (user + system) / 1e6, accepted: report.acceptedCount,
+    late: report.lateCount, dropped: report.droppedCount, rejected: report.rejectedCount,
+    steps: report.stepCount }));
   c.close();
 }
 

@@ -36,7 +36,7 @@ test('the object with the lower handle is the object of a row, however the engin
   assert.deepEqual(rows.rows({ ...contact, first: still('c'), second: still('d') }), []);
   // The client for Node refuses rows with other names.
   const [silent] = rows.rows({ ...contact, first: still('a'), second: { key: 'c', massKg: 2 } });
-  assert.deepEqual([silent.object, silent.striker], [4, { striker: '', striker_mass_kg: 2 }]);
+  assert.deepEqual([silent.object, silent.striker], [4, { striker: '', strikerMassKg: 2 }]);
 });
 
 test('velocities alone give the impulse of a collision', () => {
@@ -83,7 +83,7 @@ test('the impulses read out of Rapier are the change of momentum, friction inclu
     assert.ok(i < 5 || x < -0.01); // it slides
   }
   const { contacts: [contact], poses } = contacts.read(world);
-  near(contact.roughness.travel_speed_m_per_s, body.linvel().x, 0.01);
+  near(contact.roughness.travelSpeedMPerS, body.linvel().x, 0.01);
   near(contact.point[2], 0, 0.002);
   near(poses.positions[0][0], body.translation().x, 1e-6);
 });

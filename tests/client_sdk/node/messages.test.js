@@ -16,7 +16,7 @@ const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
 const c = carillon.connect('unix:/nowhere');
 const scene = new carillon.Scene(c, 'scenes/1');
-const MESSAGE = { handle: 3, sounding_mode_count: 1, lowest_frequency_hz: 440, highest_frequency_hz: 440 };
+const MESSAGE = { handle: 3, soundingModeCount: 1, lowestFrequencyHz: 440, highestFrequencyHz: 440 };
 const bell = new carillon.SoundingObject(scene, MESSAGE);
 const mesh = { vertices: [POINT], triangles: [[0, 0, 0]] };
 
@@ -75,9 +75,9 @@ test('an object of another scene is refused', async () => {
 
 test('a body of a likely wrong unit is told once', async () => {
   const told = [];
-  for (const [before, extent_m] of [[0, 20], [20, 202], [202, 202]]) {
-    const state = (extent) => ({ progress: { extent_m: extent } });
-    told.push(await warningsOf(() => warnOfUnit(state(extent_m), state(before))));
+  for (const [before, extentM] of [[0, 20], [20, 202], [202, 202]]) {
+    const state = (extent) => ({ progress: { extentM: extent } });
+    told.push(await warningsOf(() => warnOfUnit(state(extentM), state(before))));
   }
   assert.deepEqual([told[0], told[2]], [[], []]);
   assert.match(told[1].join(), /^UnitWarning: the body is 202 m across; .*unit: 'mm'$/);
@@ -92,11 +92,11 @@ test('what is no mesh is refused', async () => {
 
 test('a misspelt key is refused with the nearest name', async () => {
   const refusals = [
-    [() => c.createModel(mesh, { material: 'oak', max_frequency: 1 }), 'max_frequency', 'max_frequency_hz'],
-    [() => c.createModel(mesh, { material: { young: 1 } }), 'young', 'young_pa'],
+    [() => c.createModel(mesh, { material: 'oak', max_frequency: 1 }), 'max_frequency', 'maxFrequencyHz'],
+    [() => c.createModel(mesh, { material: { young: 1 } }), 'young', 'youngPa'],
     [() => c.createModel(mesh, { material: 'oak', settings: { meters_per_unit: 1 } }), 'meters_per_unit',
-      'metres_per_unit'],
-    [() => c.render(new carillon.Trace(), { tail: 1 }), 'tail', 'tail_s'],
+      'metresPerUnit'],
+    [() => c.render(new carillon.Trace(), { tail: 1 }), 'tail', 'tailS'],
     [() => c.listen({ scen: 'x' }), 'scen', 'scene'],
     [() => c.createScene({ listner: POINT }), 'listner', 'listener'],
     [() => scene.add('modalModels/1', { gian: 1 }), 'gian', 'gain'],
@@ -117,8 +117,8 @@ test('a misspelt key is refused with the nearest name', async () => {
 });
 
 test('a setting at the wrong level is refused with the right one', async () => {
-  for (const [wrong, right] of [['poisson_ratio', 'settings: { poisson_ratio: ... } or material: { poisson_ratio: ... }'],
-    ['budget_s', 'settings: { mesh: { budget_s: ... } } or transfer: { budget_s: ... }']]) {
+  for (const [wrong, right] of [['poissonRatio', 'settings: { poissonRatio: ... } or material: { poissonRatio: ... }'],
+    ['budgetS', 'settings: { mesh: { budgetS: ... } } or transfer: { budgetS: ... }']]) {
     await assert.rejects(c.createModel(mesh, { material: 'oak', [wrong]: 1 }),
       (error) => error.message.includes(`createModel has no "${wrong}"; give it as ${right}`) || assert.fail(error.message));
   }
@@ -127,15 +127,15 @@ test('a setting at the wrong level is refused with the right one', async () => {
 });
 
 test('the unit and the accuracy become settings', async () => {
-  const made = toSettings({ poisson_ratio: 0.3 }, 'mm', 0.01);
-  assert.deepEqual(made, { poisson_ratio: 0.3, metres_per_unit: 0.001, mesh: { accuracy: 0.01 } });
-  assert.deepEqual(toSettings(undefined, 2), { metres_per_unit: 2 });
+  const made = toSettings({ poissonRatio: 0.3 }, 'mm', 0.01);
+  assert.deepEqual(made, { poissonRatio: 0.3, metresPerUnit: 0.001, mesh: { accuracy: 0.01 } });
+  assert.deepEqual(toSettings(undefined, 2), { metresPerUnit: 2 });
   for (const [expected, wrong] of [
     ["unit is 'km'; it must be \"m\", \"cm\", \"mm\", \"in\", or a number of metres above zero", { unit: 'km' }],
     ['unit is 0; it must be', { unit: 0 }],
     ['accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %', { accuracy: 1 }],
-    ['unit and settings.metres_per_unit are both given; leave one of them out',
-      { unit: 'mm', settings: { metres_per_unit: 1 } }],
+    ['unit and settings.metresPerUnit are both given; leave one of them out',
+      { unit: 'mm', settings: { metresPerUnit: 1 } }],
   ]) {
     await assert.rejects(c.createModel(mesh, { material: 'oak', ...wrong }),
       (error) => error.message.includes(expected) || assert.fail(error.message));
@@ -147,7 +147,7 @@ test('a wrong word or kind of value is refused by its name', async () => {
   assert.throws(() => new carillon.Trace({ pulseShape: 'box' }), /"raised_cosine", "gaussian"/);
   assert.throws(() => new carillon.Trace().add('modalModels/1', { radiation: 'none' }), /"modes_only"/);
   await assert.rejects(c.jobs({ states: ['broken'] }).next(), /an entry of states is 'broken'; .*"failed"/);
-  await assert.rejects(c.render(new carillon.Trace(), { tail_s: 'long' }), /tail_s of render is 'long'; .* a number/);
+  await assert.rejects(c.render(new carillon.Trace(), { tailS: 'long' }), /tailS of render is 'long'; .* a number/);
   await assert.rejects(c.listen({ encoding: 'int16' }), /encoding of listen is 'int16'; .*AUDIO_ENCODING_INT16/);
   await assert.rejects(c.createModel(mesh), /material is undefined; it must be a name such as 'oak'/);
 });
@@ -199,10 +199,10 @@ test('a strike without an impulse is refused, because it would be silent', async
 
 test('a message about a job that waits says why', () => {
   const shown = (wait) => stateOf({ state: 'JOB_STATE_QUEUED', wait });
-  assert.equal(shown({ earlier_job_count: 3 }), 'queued (waiting: 3 jobs are before it)');
-  assert.equal(shown({ cause: 'WAIT_CAUSE_MEMORY', running_job_count: 1, running_job_label: 'bowl' }),
+  assert.equal(shown({ earlierJobCount: 3 }), 'queued (waiting: 3 jobs are before it)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_MEMORY', runningJobCount: 1, runningJobLabel: 'bowl' }),
     'queued (waiting for the memory of bowl)');
-  assert.equal(shown({ cause: 'WAIT_CAUSE_WORKER', running_job_count: 2 }), 'queued (waiting for one of 2 jobs)');
+  assert.equal(shown({ cause: 'WAIT_CAUSE_WORKER', runningJobCount: 2 }), 'queued (waiting for one of 2 jobs)');
   assert.equal(stateOf({ state: 'JOB_STATE_RUNNING' }), 'running');
 });
 
@@ -233,8 +233,8 @@ test('a negative duration is refused, and an undefined one is left to the daemon
   const trace = new carillon.Trace();
   trace.step(0, { impacts: { ...columns, durations: NaN } });
   trace.step(0, { impacts: [{ object: 1, point: POINT, impulse: IMPULSE, duration: NaN }] });
-  assert.deepEqual(trace.steps[0].contact_columns[0].duration_s, [-1]);
-  assert.equal('duration_s' in trace.steps[1].contacts[0], false);
+  assert.deepEqual(trace.steps[0].contactColumns[0].durationS, [-1]);
+  assert.equal('durationS' in trace.steps[1].contacts[0], false);
 });
 
 test('a trace of contacts needs the length of its steps, as a stream does', () => {
@@ -253,7 +253,7 @@ test('a step whose time is too large or goes back is refused, and the trace can 
   trace.step(2);
   assert.throws(() => trace.step(1.5), { reason: 'INVALID_STREAM', message: /goes back from 2 s to 1\.5 s at step 2;/ });
   trace.step(2);
-  assert.deepEqual(trace.steps.map((step) => step.time_s), [-1, 2, 2]);
+  assert.deepEqual(trace.steps.map((step) => step.timeS), [-1, 2, 2]);
 });
 
 test('a step whose time is too large or goes back is refused at once, and the stream can go on', async () => {
@@ -266,7 +266,7 @@ test('a step whose time is too large or goes back is refused at once, and the st
   assert.throws(() => stream.step(1.5), { reason: 'INVALID_STREAM',
     message: /goes back from 2 s to 1\.5 s at step 3; open another stream for another run$/ });
   stream.step(3);
-  assert.deepEqual(stream.waiting.map((step) => step.time_s), [-1, 2, 2, 3]);
+  assert.deepEqual(stream.waiting.map((step) => step.timeS), [-1, 2, 2, 3]);
   stream.isFull = false;
   await assert.rejects(stream.close(), carillon.ServerUnavailable);
 });
@@ -345,7 +345,7 @@ test('all that a user meets is shown in one short line', () => {
   for (const [item, expected] of [
     [c, '<Client of unix:/nowhere>'], [scene, '<Scene scenes/1 of unix:/nowhere>'],
     [bell, '<SoundingObject 3: 1 mode, 440.0 to 440.0 Hz>'],
-    [new carillon.Model(c, { name: 'modalModels/1', label: 'bell', header: { mode_count: 1 } }), '<Model bell: 1 mode>'],
+    [new carillon.Model(c, { name: 'modalModels/1', label: 'bell', header: { modeCount: 1 } }), '<Model bell: 1 mode>'],
     [trace, '<Trace: 1 object, 1 step, to 0.5 s>'],
     [new carillon.Sound(new Float32Array(4800), 48000, 1), '<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>'],
   ]) assert.equal(inspect(item), expected);

@@ -49,7 +49,7 @@ function rendered(steps, { count = 1, poses = [], ...settings } = {}) {
   const trace = new carillon.Trace({ step: 1 / 240, ...settings });
   for (let i = 0; i < count; i += 1) trace.add(model, { pose: poses[i] });
   for (const [time, content] of steps) trace.step(time, content);
-  return c.render(trace, { tail_s: 0.3 });
+  return c.render(trace, { tailS: 0.3 });
 }
 
 function loudestHz({ samples, sampleRateHz }) {
@@ -78,7 +78,7 @@ test('a mesh of arrays is a model of the same modes as its file', async () => {
   assert.equal(same.modeCount, model.modeCount);
   assert.equal(states.at(-1), 'JOB_STATE_SUCCEEDED');
   const found = [];
-  for await (const one of c.models({ label_contains: 'arr' })) found.push(one.name);
+  for await (const one of c.models({ labelContains: 'arr' })) found.push(one.name);
   assert.deepEqual(found, same.name === model.name ? found : [same.name]);
 });
 
@@ -108,9 +108,9 @@ test('a mesh has the unit and the accuracy that are asked for', async () => {
     .map(([kind, ...words]) => (kind === 'v' ? ['v', ...words.map((word) => 1000 * word)] : [kind, ...words]).join(' '));
   const file = path.join(FOLDER, 'bar_mm.obj');
   await fs.writeFile(file, text.join('\n'));
-  const { settings, volume_m3: volume } = (await c.createModel(file, { material, unit: 'mm', accuracy: 0.05 })).summary.header;
-  assert.deepEqual([settings.metres_per_unit, settings.mesh.accuracy], [0.001, 0.05]);
-  assert.ok(Math.abs(volume / model.summary.header.volume_m3 - 1) < 1e-6);
+  const { settings, volumeM3: volume } = (await c.createModel(file, { material, unit: 'mm', accuracy: 0.05 })).summary.header;
+  assert.deepEqual([settings.metresPerUnit, settings.mesh.accuracy], [0.001, 0.05]);
+  assert.ok(Math.abs(volume / model.summary.header.volumeM3 - 1) < 1e-6);
 });
 
 test('a glTF brings the file with its data', async () => {
@@ -124,9 +124,9 @@ test('a glTF brings the file with its data', async () => {
 test('the daemon says what it is', async () => {
   const info = await c.info();
   assert.equal(info.version, require('carillon/package.json').version);
-  assert.equal(info.limits.scene_count, 512);
+  assert.equal(info.limits.sceneCount, 512);
   assert.ok(info.features.includes('decomposition'));
-  assert.ok(info.uptime_s > 0);
+  assert.ok(info.uptimeS > 0);
 });
 
 test('a rendered strike rings at the lowest bending mode, and is the same again', async () => {
@@ -151,7 +151,7 @@ test('a scene with an id is found again with its objects', async () => {
     const again = await c.createScene({ id: 'lathe-1' });
     assert.equal(again.existing, true);
     assert.deepEqual((await again.objects()).map((object) => object.handle), [1, 7]);
-    assert.equal((await again.get()).object_count, 2);
+    assert.equal((await again.get()).objectCount, 2);
     await assert.rejects(c.createScene({ id: 'lathe-1', gain: 2 }), { reason: 'SCENE_DIFFERS' });
   } finally {
     await made.delete();
@@ -164,7 +164,7 @@ test('jobs are watched and listed by state and label', async () => {
     break;
   }
   const labels = [];
-  for await (const job of c.jobs({ states: ['succeeded'], label_contains: model.label })) labels.push(job.label);
+  for await (const job of c.jobs({ states: ['succeeded'], labelContains: model.label })) labels.push(job.label);
   assert.ok(labels.includes(model.label));
   for await (const job of c.jobs({ states: ['cancelled'] })) assert.fail(job.name);
 });
@@ -214,18 +214,18 @@ test('a stream counts, and tells what was wrong', async () => {
     await stream.step(0.2, { impacts: [{ object: bars[0], point: POINT, impulse: [0, 0, -1e9] }] });
     await stream.step(0.2, { impacts: [{ object: bars[0], point: [0, 0, 1], impulse: IMPULSE }] });
     const report = await stream.close();
-    assert.equal(report.step_count, 50);
-    assert.equal(report.rejected_count, 1);
+    assert.equal(report.stepCount, 50);
+    assert.equal(report.rejectedCount, 1);
     assert.equal(stream.rejection.reason, 'IMPULSE_TOO_LARGE');
     assert.equal(stream.warnings.find(({ id }) => id === 'POINTS_DISTANT').count, 1);
-    assert.ok(stream.findings.load_count > 0);
+    assert.ok(stream.findings.loadCount > 0);
     assert.deepEqual((await scene.objects()).map((bar) => bar.handle), bars.map((bar) => bar.handle));
   });
 });
 
 test('a material and settings that the daemon told may be given back', async () => {
   const found = await c.model(model.name);
-  assert.ok('_poisson_ratio' in found.material);
+  assert.ok('_poissonRatio' in found.material);
   const again = await c.createModel(BAR, { material: found.material, settings: found.summary.header.settings });
   assert.equal(again.modeCount, model.modeCount);
   await withScene(async (scene) => assert.equal((await scene.add(found)).handle, 1));
@@ -315,7 +315,7 @@ test('a trace is written and read, and a damaged one is refused', async () => {
   trace.step(0, { impacts: [{ object: 1, ...STRIKE }] });
   const file = path.join(FOLDER, 'node.contacts');
   await trace.write(file);
-  const [one, other] = [await c.render(trace, { tail_s: 0.2 }), await c.render(file, { tail_s: 0.2 })];
+  const [one, other] = [await c.render(trace, { tailS: 0.2 }), await c.render(file, { tailS: 0.2 })];
   assert.ok(one.peak > 1e-4);
   assert.deepEqual(one.samples, other.samples);
   const header = [4, 0x0a, 2, 8, 1];
@@ -333,7 +333,7 @@ test('a scene is turned down, muted and stopped', async () => {
   try {
     assert.equal((await scene.update({ muted: true })).gain, 0.5);
     const bar = await scene.add(model);
-    const muted = await scene.listen({ block_frame_count: 4800 });
+    const muted = await scene.listen({ blockFrameCount: 4800 });
     await bar.strike(STRIKE);
     assert.equal((await muted.take(0.5)).peak, 0);
     await scene.update({ muted: false });
@@ -389,7 +389,7 @@ test('a stream that is being closed ends though its client is closed', async () 
   await stream.step(0, { impacts: [{ object: bar.handle, ...STRIKE }] });
   const closed = stream.close();
   own.close();
-  assert.equal(Number((await closed).step_count), 1);
+  assert.equal(Number((await closed).stepCount), 1);
   await scene.delete();
 });
 
@@ -437,7 +437,7 @@ test('a stream that is too fast drops the oldest steps', async () => withScene(a
   for (let i = 0; i < 5000; i += 1) stream.step(0.001 * i, {});
   assert.ok(stream.droppedStepCount > 5000 - 4096 - 100);
   const report = await stream.close();
-  assert.equal(Number(report.step_count) + stream.droppedStepCount, 5000);
+  assert.equal(Number(report.stepCount) + stream.droppedStepCount, 5000);
   assert.ok(messageCount < 100, `the steps that waited were sent in ${messageCount} messages`);
   assert.equal(stream.waitingStepCount, 0);
 }));

@@ -30,7 +30,7 @@ async function main() {
   const c = carillon.connect(server);
   const trace = makeTrace(model);
   await trace.write(traceFile);
-  const { samples } = await c.render(trace, { tail_s: 0.5, channel_count: 2 });
+  const { samples } = await c.render(trace, { tailS: 0.5, channelCount: 2 });
   fs.writeFileSync(samplesFile, Buffer.from(samples.buffer, samples.byteOffset, samples.byteLength));
   c.close();
 }
