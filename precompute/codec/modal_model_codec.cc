@@ -47,6 +47,26 @@ v1::Verification ToProto(const Verification& proof) {
   return result;
 }
 
+void AddRegions(const ModalModel& model, v1::ModalModelHeader& header) {
+  for (const ModelRegion& region : model.regions) {
+    v1::ModalModelRegion& added = *header.add_regions();
+    v1::RegionProperties& properties = *added.mutable_properties();
+    properties.set_region(region.material.region);
+    properties.set_relative_young(region.material.elastic.young_pa);
+    properties.set_relative_density(region.material.density_kg_per_m3);
+    properties.set_poisson_ratio(region.material.elastic.poisson_ratio);
+    for (const double part : region.strain_parts) {
+      added.add_strain_energy_parts(static_cast<float>(part));
+    }
+    for (const double part : region.kinetic_parts) {
+      added.add_kinetic_energy_parts(static_cast<float>(part));
+    }
+  }
+  header.set_given_triangle_regions(model.given_triangle_regions.data(),
+                                    model.given_triangle_regions.size());
+  header.mutable_mass_moments()->Assign(model.mass_moments.begin(), model.mass_moments.end());
+}
+
 v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& origin) {
   v1::ModalModelRecord record;
   v1::ModalModelHeader& header = *record.mutable_header();
@@ -65,6 +85,7 @@ v1::ModalModelRecord MakeHeader(const ModalModel& model, const ModelOrigin& orig
   for (const ArraySpec& spec : kModelArrays) {
     *header.add_arrays() = DescribeArray(spec, SizesOf(model));
   }
+  AddRegions(model, header);
   for (const std::string& warning : model.warnings) header.add_warnings(warning);
   for (const double error : model.estimated_errors) {
     header.add_estimated_errors(static_cast<float>(error));

@@ -99,6 +99,21 @@ class ModelReader {
     model.complete_to_eigenvalue = header.complete_to_eigenvalue();
     model.lowered_from_mode_count = static_cast<int>(header.lowered_from_mode_count());
     model.left_out_mode_count = static_cast<int>(header.left_out_mode_count());
+    model.mass_moments.assign(header.mass_moments().begin(), header.mass_moments().end());
+    for (const v1::ModalModelRegion& region : header.regions()) {
+      const v1::RegionProperties& properties = region.properties();
+      model.regions.push_back(
+          {.material = {.region = properties.region(),
+                        .elastic = {.young_pa = properties.relative_young(),
+                                    .poisson_ratio = properties.poisson_ratio()},
+                        .density_kg_per_m3 = properties.relative_density()},
+           .strain_parts = {region.strain_energy_parts().begin(),
+                            region.strain_energy_parts().end()},
+           .kinetic_parts = {region.kinetic_energy_parts().begin(),
+                             region.kinetic_energy_parts().end()}});
+      model.regions.back().strain_parts.resize(header.mode_count());
+      model.regions.back().kinetic_parts.resize(header.mode_count());
+    }
     model.warnings.assign(header.warnings().begin(), header.warnings().end());
     model.estimated_errors.assign(header.estimated_errors().begin(),
                                   header.estimated_errors().end());

@@ -176,14 +176,14 @@ void AddElement(const NodeGraph& graph, std::span<const int32_t> nodes, const St
 
 }  // namespace
 
-SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
-                        double density_kg_per_m3, MassSharing sharing) {
+SystemMatrices Assemble(const TetMesh& mesh, const BodyMaterials& materials, MassSharing sharing) {
   const NodeGraph graph = MakeNodeGraph(mesh);
   SystemMatrices system{.K = MakeBlockPattern(graph),
                         .M = MakeDiagonalBlockPattern(graph, sharing == MassSharing::kLumped)};
-  const LameConstants lame = ToLame(elastic);
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const std::span<const int32_t> nodes = ElementNodes(mesh, e);
+    const LameConstants& lame = materials.LameOf(mesh, e);
+    const double density_kg_per_m3 = materials.DensityOf(mesh, e);
     if (IsCurved(mesh, e)) {
       const TenNodes places = NodesOf(mesh, e);
       AddElement(graph, nodes, MakeCurvedStiffness(places, lame),

@@ -3,7 +3,7 @@
 
 #include <Eigen/SparseCore>
 
-#include "precompute/fem/elastic_constants.h"
+#include "precompute/fem/body_materials.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/tet_mesh.h"
 
@@ -26,8 +26,13 @@ struct SystemMatrices {
 /// Assembles the matrices of a body from elements of 4 or 10 nodes. Elements with curved edges are
 /// isoparametric. Fixed nodes have no unknowns. Every element must have positive volume, and pass
 /// CheckCurvedElements.
-SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
-                        double density_kg_per_m3, MassSharing sharing);
+SystemMatrices Assemble(const TetMesh& mesh, const BodyMaterials& materials, MassSharing sharing);
+
+/// Assembles the matrices of a body of one material.
+inline SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elastic,
+                               double density_kg_per_m3, MassSharing sharing) {
+  return Assemble(mesh, BodyMaterials(elastic, density_kg_per_m3), sharing);
+}
 
 /// Returns the volume of the mesh, m^3.
 double VolumeM3(const TetMesh& mesh);

@@ -23,6 +23,13 @@ struct MeshGroup {
   std::vector<std::array<int32_t, 4>> simplices = {};
 };
 
+/// A named part of the volume, which may have a material of its own.
+struct MeshRegion {
+  std::string name;
+  std::string material = {};  ///< the name of its material in the file, or empty
+  bool operator==(const MeshRegion&) const = default;
+};
+
 /// The names and numbers by which a mesh file identifies parts of the body.
 struct MeshNames {
   /// The position of each vertex, with the vertex's number as the key. Vertices of a surface are
@@ -30,6 +37,8 @@ struct MeshNames {
   /// numbers.
   absl::flat_hash_map<int64_t, Point> vertices = {};
   std::vector<MeshGroup> groups = {};
+  /// The regions of tetrahedra, in the order of TetMesh::regions; empty if the file names none.
+  std::vector<MeshRegion> regions = {};
   /// The place in the file, metres, from which all positions of the mesh are counted. It is zero
   /// unless the body lies so far away that single precision would not resolve it.
   Point origin_m = {0, 0, 0};

@@ -36,8 +36,13 @@ struct TetMesh {
   std::vector<BoundaryFace> boundary;
   /// Fixed nodes, ascending; empty if the body is free.
   std::vector<int32_t> fixed = {};
+  /// The number of the region of each element; empty if the body has one region.
+  std::vector<int32_t> regions = {};
 
   size_t element_count() const { return elements.size() / static_cast<size_t>(nodes_per_element); }
+  size_t RegionOf(size_t element) const {
+    return regions.empty() ? 0 : static_cast<size_t>(regions[element]);
+  }
 };
 
 }  // namespace carillon::precompute

@@ -57,9 +57,14 @@ std::vector<double> Audibilities(const ModalModel& model) {
 void KeepModes(const std::vector<size_t>& kept, ModalModel& model) {
   const size_t found = model.eigenvalues.size();
   PickColumns(kept, found, model.shapes);
-  for (auto* values : {&model.eigenvalues, &model.residuals, &model.couplings,
-                       &model.estimated_errors, &model.poisson_slopes}) {
+  for (auto* values :
+       {&model.eigenvalues, &model.residuals, &model.couplings, &model.estimated_errors}) {
     Pick(kept, *values);
+  }
+  if (!model.poisson_slopes.empty()) Pick(kept, model.poisson_slopes);
+  for (ModelRegion& region : model.regions) {
+    Pick(kept, region.strain_parts);
+    Pick(kept, region.kinetic_parts);
   }
   model.left_out_mode_count += static_cast<int>(found - kept.size());
 }

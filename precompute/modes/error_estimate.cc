@@ -184,9 +184,9 @@ TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
 /// Sums the contributions of the elements to each edge and face.
 class Estimator {
  public:
-  Estimator(const TetMesh& mesh, const ElasticConstants& elastic)
+  Estimator(const TetMesh& mesh, const BodyMaterials& materials)
       : mesh_(mesh),
-        lame_(ToLame(elastic)),
+        materials_(materials),
         nodes_(static_cast<size_t>(mesh.nodes_per_element)),
         integrals_(mesh.nodes_per_element),
         places_(mesh),
@@ -201,7 +201,7 @@ class Estimator {
       const TetGeometry geometry = GeometryOf(mesh_, Element(e));
       for (size_t i = 0; i < places_.added(); ++i) {
         stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
-            Stiffness(integrals_.own[i], geometry, lame_);
+            Stiffness(integrals_.own[i], geometry, materials_.LameOf(mesh_, e));
       }
     }
   }
@@ -306,7 +306,8 @@ class Estimator {
   const int32_t* Element(size_t e) const { return &mesh_.elements[e * nodes_]; }
 
   void AddCurved(size_t e) {
-    const Eigen::Matrix<double, 3, 30> own = curved_.OfAdded(NodesOf(mesh_, e), lame_);
+    const Eigen::Matrix<double, 3, 30> own =
+        curved_.OfAdded(NodesOf(mesh_, e), materials_.LameOf(mesh_, e));
     for (size_t i = 0; i < places_.added(); ++i) {
       stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
           own.middleCols<3>(static_cast<Eigen::Index>(3 * i));
@@ -314,12 +315,14 @@ class Estimator {
   }
 
   void FillCurved(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
-    const CurvedIntegrals::Mixed mixed = curved_.OfBoth(NodesOf(mesh_, e), lame_);
+    const CurvedIntegrals::Mixed mixed =
+        curved_.OfBoth(NodesOf(mesh_, e), materials_.LameOf(mesh_, e));
+    const double density = materials_.DensityOf(mesh_, e);
     element.stiffness = mixed.stiffness;
     for (Eigen::Index n = 0; n < 10; ++n) {
       element.shapes.middleRows<3>(3 * n) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
       for (Eigen::Index i = 0; i < 10; ++i) {
-        element.mass.block<3, 3>(3 * i, 3 * n).diagonal().setConstant(mixed.mass(i, n));
+        element.mass.block<3, 3>(3 * i, 3 * n).diagonal().setConstant(density * mixed.mass(i, n));
       }
     }
   }
@@ -327,23 +330,25 @@ class Estimator {
   void Fill(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
     if (IsCurved(mesh_, e)) return FillCurved(e, shapes, element);
     const TetGeometry geometry = GeometryOf(mesh_, Element(e));
+    const LameConstants& lame = materials_.LameOf(mesh_, e);
+    const double mass = materials_.DensityOf(mesh_, e) * geometry.volume_m3;
     for (size_t n = 0; n < nodes_; ++n) {
       const auto column = static_cast<Eigen::Index>(3 * n);
       element.shapes.middleRows<3>(column) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
       for (size_t i = 0; i < places_.added(); ++i) {
         const auto row = static_cast<Eigen::Index>(3 * i);
         element.stiffness.block<3, 3>(row, column) =
-            Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame_);
+            Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame);
         element.mass.block<3, 3>(row, column)
             .diagonal()
-            .setConstant(geometry.volume_m3 * integrals_.mass(static_cast<Eigen::Index>(i),
-                                                              static_cast<Eigen::Index>(n)));
+            .setConstant(
+                mass * integrals_.mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n)));
       }
     }
   }
 
   const TetMesh& mesh_;
-  const LameConstants lame_;
+  const BodyMaterials& materials_;
   const size_t nodes_;
   const ReferenceIntegrals integrals_;
   const CurvedIntegrals curved_;
@@ -355,9 +360,9 @@ class Estimator {
 
 }  // namespace
 
-ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const BodyMaterials& materials,
                                       const Modes& modes) {
-  Estimator estimator(mesh, elastic);
+  const Estimator estimator(mesh, materials);
   const double constant = mesh.nodes_per_element == 10 ? kQuadraticConstant : kLinearConstant;
   Eigen::VectorXd errors(modes.eigenvalues.size());
   Workers workers(ThreadCount());

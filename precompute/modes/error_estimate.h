@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "precompute/eigen/eigensolver.h"
-#include "precompute/fem/elastic_constants.h"
+#include "precompute/fem/body_materials.h"
 #include "precompute/mesh/tet_mesh.h"
 
 namespace carillon::precompute {
@@ -43,10 +43,10 @@ struct ErrorEstimate {
 /// errors are a half or more. The estimate refers to the body as meshed, including curved elements.
 /// It does not include the difference between the mesh and the shape of the original object.
 ///
-/// `elastic` has the constants of the matrices from which the modes were computed, for unit
-/// density. A consistent mass is assumed. Shapes include all nodes; fixed edges and faces add
+/// `materials` are those of the matrices from which the modes were computed. A consistent mass is
+/// assumed. Shapes include all nodes; fixed edges and faces add
 /// nothing.
-ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const ElasticConstants& elastic,
+ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const BodyMaterials& materials,
                                       const Modes& modes);
 
 }  // namespace carillon::precompute

@@ -8,6 +8,7 @@
 #include "precompute/modes/coupling.h"
 #include "precompute/modes/error_estimate.h"
 #include "precompute/modes/poisson_slopes.h"
+#include "precompute/modes/region_energies.h"
 
 namespace carillon::precompute {
 namespace {
@@ -39,24 +40,24 @@ std::vector<float> ShapesOnSurface(const SoundingSurface& surface, const Eigen::
   return result;
 }
 
-double ErrorOfLowest(const TetMesh& mesh, const ElasticConstants& elastic, const Modes& above) {
+double ErrorOfLowest(const TetMesh& mesh, const BodyMaterials& materials, const Modes& above) {
   if (above.eigenvalues.size() == 0) return 0;
-  return EstimateFrequencyErrors(mesh, elastic, above).errors[0];
+  return EstimateFrequencyErrors(mesh, materials, above).errors[0];
 }
 
 }  // namespace
 
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
-                          const ElasticConstants& elastic, const DeformationModes& solution) {
+                          const BodyMaterials& materials, const DeformationModes& solution) {
   SoundingSurface surface = MakeSoundingSurface(mesh);
-  ErrorEstimate estimate = EstimateFrequencyErrors(mesh, elastic, solution.modes);
+  ErrorEstimate estimate = EstimateFrequencyErrors(mesh, materials, solution.modes);
   ModalModel model{.node_count = static_cast<int>(mesh.nodes.size()),
                    .element_count = static_cast<int>(mesh.element_count()),
                    .volume_m3 = VolumeM3(mesh),
                    .complete_to_eigenvalue = solution.complete_to_eigenvalue,
                    .lowered_from_mode_count = solution.mode_count_below_asked,
                    .lowest_eigenvalue = solution.lowest_eigenvalue,
-                   .lowest_error = ErrorOfLowest(mesh, elastic, solution.above),
+                   .lowest_error = ErrorOfLowest(mesh, materials, solution.above),
                    .verification = solution.verification,
                    .check = {},
                    .left_out_mode_count = 0,
@@ -65,7 +66,7 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
                    .residuals = ToVector(solution.residuals),
                    .couplings = ToVector(Couplings(mesh, surface, solution.modes)),
                    .estimated_errors = ToVector(estimate.errors),
-                   .poisson_slopes = ToVector(PoissonSlopes(mesh, elastic, solution.modes)),
+                   .poisson_slopes = {},
                    .error_at_node = std::move(estimate.at_node),
                    .vertices = {},
                    .triangles = std::move(surface.triangles),
@@ -75,6 +76,14 @@ ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
   for (const int32_t node : surface.nodes) {
     model.vertices.push_back(ToFloat(mesh.nodes[static_cast<size_t>(node)]));
   }
+  if (mesh.regions.empty()) {
+    const ElasticConstants& elastic = materials.regions()[0].elastic;
+    model.poisson_slopes = ToVector(PoissonSlopes(mesh, elastic, solution.modes));
+    return model;
+  }
+  model.regions = RegionEnergies(mesh, materials, solution.modes);
+  model.given_triangle_regions = GivenTriangleRegions(mesh, given);
+  model.mass_moments = MassMoments(mesh, materials);
   return model;
 }
 

@@ -8,12 +8,20 @@
 #include <string>
 #include <vector>
 
+#include "precompute/fem/body_materials.h"
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/spectra_check.h"
 
 namespace carillon::precompute {
+
+/// A region of a body of several materials, and its parts of the energies of each mode.
+struct ModelRegion {
+  RegionMaterial material;            ///< relative to the reference of the model
+  std::vector<double> strain_parts;   ///< #modes, from 0 to 1
+  std::vector<double> kinetic_parts;  ///< #modes, from 0 to 1
+};
 
 /// The result of a decomposition, for unit Young's modulus and unit density.
 struct ModalModel {
@@ -51,6 +59,12 @@ struct ModalModel {
   /// For each of `triangles`, the given triangle on which it lies.
   std::vector<int32_t> given_triangle;
   SurfaceMesh given;
+  /// The regions of a body of several materials; empty if it has one.
+  std::vector<ModelRegion> regions = {};
+  /// For each given triangle, the region that it bounds; empty if there are no regions.
+  std::vector<uint8_t> given_triangle_regions = {};
+  /// The mass, its first and its second moments, see MassMoments; empty if there are no regions.
+  std::vector<double> mass_moments = {};
 
   /// #vertices by 3 by #modes, row-major: mass-normalised shapes on the sounding surface,
   /// kg^(-1/2).
@@ -63,8 +77,8 @@ struct ModalModel {
 };
 
 /// Makes a model from a solution. `given` is the surface to which the given triangles of the
-/// boundary of `mesh` refer (tet_mesh.h). `elastic` has the constants of the matrices.
+/// boundary of `mesh` refer (tet_mesh.h). `materials` are those of the matrices.
 ModalModel MakeModalModel(const TetMesh& mesh, const SurfaceMesh& given,
-                          const ElasticConstants& elastic, const DeformationModes& solution);
+                          const BodyMaterials& materials, const DeformationModes& solution);
 
 }  // namespace carillon::precompute

@@ -12,6 +12,7 @@
 #include "precompute/mesh/fill/midside_nodes.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/read/read_mesh.h"
+#include "precompute/pipeline/body_regions.h"
 #include "precompute/pipeline/model_checks.h"
 #include "precompute/pipeline/worker_request.h"
 #include "proto/cpp/error_reason.h"
@@ -45,11 +46,11 @@ absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings&
   std::vector<std::string> warnings = surface.prepared.warnings;
   const int asked = static_cast<int>(request.settings().mesh().target_node_count());
   if (meshing.target_node_count == asked) WarnOfMoreNodes(asked, mesh, warnings);
-  return Body{surface.given, std::move(mesh), std::move(warnings),
+  return Body{surface.given, std::move(mesh), surface.materials, std::move(warnings),
               surface.prepared.frequency_error};
 }
 
-absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
+absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names, BodyMaterials materials,
                                     const worker::v1::WorkerRequest& request) {
   const int nodes_per_element = MeshingOf(request).nodes_per_element;
   if (mesh.nodes_per_element > nodes_per_element) {
@@ -59,10 +60,12 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names,
         "for quadratic elements, or give a mesh of four-node tetrahedra");
   }
   RETURN_IF_ERROR(CheckCurvedElements(mesh));
+  // A body of one material does not need the regions.
+  if (request.settings().regions().empty()) mesh.regions.clear();
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));
-  return Body{.given = std::move(given), .mesh = std::move(mesh), .warnings = {}};
+  return Body{std::move(given), std::move(mesh), std::move(materials), {}};
 }
 
 /// Whether the surface may get other triangles. Fixtures can name vertices of the given ones.
@@ -102,9 +105,11 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
   const absl::Status unit = CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request));
   if (request.max_frequency_hz() > 0) RETURN_IF_ERROR(unit);
   if (!unit.ok()) read.warnings.push_back(ToErrorInfo(unit).message());
+  ASSIGN_OR_RETURN(BodyMaterials materials, MaterialsOf(request, read.names.regions));
   observer.OnProgress(v1::PHASE_MESH, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
-    ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names, request));
+    ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names,
+                                               std::move(materials), request));
     body.warnings = std::move(read.warnings);
     return body;
   }
@@ -116,7 +121,8 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
                              .most_triangles = 2 * settings.mesh().target_node_count()});
   if (!prepared.ok()) return WithExtent(prepared.status(), given);
   std::ranges::move(read.warnings, std::back_inserter(prepared->warnings));
-  return Fillable{std::move(given), *std::move(prepared), std::move(read.names)};
+  return Fillable{std::move(given), *std::move(prepared), std::move(materials),
+                  std::move(read.names)};
 }
 
 absl::StatusOr<Body> Fill(const Fillable& surface, MeshingSettings meshing,

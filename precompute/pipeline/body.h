@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/worker/v1/worker.pb.h"
+#include "precompute/fem/body_materials.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/mesh/mesh_names.h"
 #include "precompute/mesh/surface/prepare_surface.h"
@@ -20,6 +21,7 @@ namespace carillon::precompute {
 struct Body {
   SurfaceMesh given;
   TetMesh mesh;
+  BodyMaterials materials;  ///< relative to the reference of the request
   std::vector<std::string> warnings;
   double frequency_error = 0;  ///< estimated and relative, because its surface was coarsened
   bool graded = false;         ///< the mesh has the relative sizes that were asked for
@@ -29,6 +31,7 @@ struct Body {
 struct Fillable {
   SurfaceMesh given;
   PreparedSurface prepared;
+  BodyMaterials materials;  ///< relative to the reference of the request
   MeshNames names;
 };
 
@@ -36,8 +39,8 @@ struct Fillable {
 using Input = std::variant<Fillable, Body>;
 
 /// Reads the bytes of a mesh file, and prepares a surface as `request` wants it. Errors: those of
-/// ParseMesh, CheckUnit, PrepareSurface and FixNodes; INVALID_SETTINGS if linear elements are
-/// requested but the mesh has ten-node elements.
+/// ParseMesh, MaterialsOf, CheckUnit, PrepareSurface and FixNodes; INVALID_SETTINGS if linear
+/// elements are requested but the mesh has ten-node elements.
 absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::WorkerRequest& request,
                                 DecompositionObserver& observer);
 

@@ -31,8 +31,7 @@ double IntendedUse::DecayRatePerS(double unit_eigenvalue) const {
   return (alpha1_s * Eigenvalue(unit_eigenvalue) + alpha2_per_s + loss_rate) / 2;
 }
 
-double IntendedUse::DampedFrequencyHz(double unit_eigenvalue) const {
-  const double decay_per_s = DecayRatePerS(unit_eigenvalue);
+double IntendedUse::DampedFrequencyHz(double unit_eigenvalue, double decay_per_s) const {
   return std::sqrt(std::max(0.0, Eigenvalue(unit_eigenvalue) - decay_per_s * decay_per_s)) / kTwoPi;
 }
 

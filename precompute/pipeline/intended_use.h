@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "carillon/v1/material.pb.h"
 #include "proto/cpp/loss_factor.h"
 
 namespace carillon::precompute {
@@ -22,6 +23,7 @@ struct IntendedUse {
   /// Whether `high_hz` is the default, so that it may be lowered for a body that costs too much.
   bool high_is_default = false;
   std::vector<LossFactorPoint> loss_factor = {};  ///< ascending; damping added to D
+  v1::Material material = {};                     ///< the whole material, with its regions
 
   /// Returns Lambda E / (rho s^2), 1/s^2, for an eigenvalue Lambda of unit material and size.
   double Eigenvalue(double unit_eigenvalue) const;
@@ -33,7 +35,7 @@ struct IntendedUse {
   /// exp(-rate t), with omega^2 = Eigenvalue(unit_eigenvalue) and the loss factor eta at omega.
   double DecayRatePerS(double unit_eigenvalue) const;
   /// Returns sqrt(omega^2 - decay rate^2) / (2 pi), or zero for an overdamped mode.
-  double DampedFrequencyHz(double unit_eigenvalue) const;
+  double DampedFrequencyHz(double unit_eigenvalue, double decay_per_s) const;
 };
 
 }  // namespace carillon::precompute

@@ -37,7 +37,8 @@ absl::StatusOr<Transfer> Radiate(const ModalModel& model, const worker::v1::Work
   const SurfaceModes modes{.vertices = model.vertices,
                            .triangles = model.triangles,
                            .eigenvalues = model.eigenvalues,
-                           .shapes = model.shapes};
+                           .shapes = model.shapes,
+                           .mass_moments = model.mass_moments};
   observer.OnRound({});
   observer.OnPlan({{.phase = v1::PHASE_RADIATE, .predicted_s = settings.budget_cpu_s}});
   observer.OnProgress(v1::PHASE_RADIATE, 0);

@@ -69,13 +69,13 @@ struct Reference {
   Eigen::VectorXd errors;
 };
 
-absl::StatusOr<Reference> SolveReference(const TetMesh& refined, const ElasticConstants& elastic,
+absl::StatusOr<Reference> SolveReference(const TetMesh& refined, const BodyMaterials& materials,
                                          MassSharing sharing, double limit) {
-  const SystemMatrices system = Assemble(refined, elastic, 1, sharing);
+  const SystemMatrices system = Assemble(refined, materials, sharing);
   absl::StatusOr<DeformationModes> solution = SolveDeformationModes(
       system, refined, limit, [](SolveStage, double) {}, {.means = kComparisonMeans});
   if (!solution.ok()) return solution.status();
-  Eigen::VectorXd errors = EstimateFrequencyErrors(refined, elastic, solution->modes).errors;
+  Eigen::VectorXd errors = EstimateFrequencyErrors(refined, materials, solution->modes).errors;
   return Reference{refined.nodes.size(), *std::move(solution), std::move(errors)};
 }
 
@@ -121,11 +121,11 @@ TetMesh Refined(const TetMesh& mesh) {
   return refined;
 }
 
-void CompareWith(const TetMesh& finer, const ElasticConstants& elastic, MassSharing sharing,
+void CompareWith(const TetMesh& finer, const BodyMaterials& materials, MassSharing sharing,
                  ModalModel& model) {
   if (model.eigenvalues.empty()) return;
   const absl::StatusOr<Reference> reference =
-      SolveReference(finer, elastic, sharing, model.complete_to_eigenvalue);
+      SolveReference(finer, materials, sharing, model.complete_to_eigenvalue);
   if (!reference.ok()) return;
   const double compared_to = reference->solution.complete_to_eigenvalue;
   const auto own = std::ranges::count_if(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "precompute/fem/elastic_constants.h"
+#include "precompute/fem/body_materials.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/tet_mesh.h"
 #include "precompute/modes/modal_model.h"
@@ -26,7 +26,7 @@ TetMesh Refined(const TetMesh& mesh);
 /// If modes are missing, or an estimated error was too small, the model gets a warning that says
 /// so. `elastic` and `sharing` are those of the model's matrices. All modes of the model's mesh
 /// below its limit must be in the model.
-void CompareWith(const TetMesh& finer, const ElasticConstants& elastic, MassSharing sharing,
+void CompareWith(const TetMesh& finer, const BodyMaterials& materials, MassSharing sharing,
                  ModalModel& model);
 
 }  // namespace carillon::precompute

@@ -38,11 +38,6 @@ absl::StatusOr<DeformationModes> FindModes(const SystemMatrices& system, const T
       OptionsOf(request, observer));
 }
 
-/// The elasticity of unit Young's modulus.
-ElasticConstants ElasticOf(const worker::v1::WorkerRequest& request) {
-  return {.young_pa = 1, .poisson_ratio = request.settings().poisson_ratio()};
-}
-
 /// The model of a solved body, with what is to be said about it so far.
 ModalModel MakeModel(const Body& body, const SystemMatrices& system,
                      const DeformationModes& solution, const worker::v1::WorkerRequest& request) {
@@ -51,7 +46,7 @@ ModalModel MakeModel(const Body& body, const SystemMatrices& system,
   if (settings.check_with() == v1::SOLVER_SPECTRA) {
     check = CheckWithSpectra(system, body.mesh, solution);
   }
-  ModalModel model = MakeModalModel(body.mesh, body.given, ElasticOf(request), solution);
+  ModalModel model = MakeModalModel(body.mesh, body.given, body.materials, solution);
   model.warnings = body.warnings;
   for (double& error : model.estimated_errors) error += body.frequency_error;
   WarnOfLowerBand(solution, UseOf(request), Diagonal(body.mesh.nodes), model);
@@ -78,7 +73,7 @@ absl::StatusOr<Solved> SolveBody(Body body, const worker::v1::WorkerRequest& req
                                  DecompositionObserver& observer) {
   observer.OnMesh(body.mesh.nodes.size());
   observer.OnProgress(v1::PHASE_ASSEMBLE, 0);
-  const SystemMatrices system = Assemble(body.mesh, ElasticOf(request), 1, MassSharingOf(request));
+  const SystemMatrices system = Assemble(body.mesh, body.materials, MassSharingOf(request));
   ASSIGN_OR_RETURN(const DeformationModes modes, FindModes(system, body.mesh, request, observer));
   observer.OnProgress(v1::PHASE_WRITE, 0);
   ModalModel model = MakeModel(body, system, modes, request);
@@ -95,8 +90,8 @@ void CheckFewElements(const Fillable* surface, const worker::v1::WorkerRequest& 
   if (surface != nullptr) {
     finer = Fill(*surface, {.target_node_count = kReferenceCornerCount}, request);
   }
-  CompareWith(finer.ok() ? finer->mesh : Refined(body.mesh), ElasticOf(request),
-              MassSharingOf(request), model);
+  CompareWith(finer.ok() ? finer->mesh : Refined(body.mesh), body.materials, MassSharingOf(request),
+              model);
 }
 
 }  // namespace carillon::precompute

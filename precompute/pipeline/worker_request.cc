@@ -11,6 +11,7 @@
 #include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/status_macros.h"
 #include "proto/cpp/worker_request_text.h"
 
@@ -72,6 +73,7 @@ absl::StatusOr<worker::v1::WorkerRequest> Complete(worker::v1::WorkerRequest req
     request.mutable_transfer()->set_accuracy_db(kUsualAccuracyDb);
   }
   ASSIGN_OR_RETURN(*request.mutable_material(), ResolveMaterial(request.material()));
+  SetRegions(request.material(), *request.mutable_settings());
   return request;
 }
 
@@ -96,7 +98,8 @@ IntendedUse UseOf(const worker::v1::WorkerRequest& request) {
           .low_hz = request.min_frequency_hz(),
           .high_hz = HighestHz(request),
           .high_is_default = request.max_frequency_hz() == 0,
-          .loss_factor = LossFactorOf(material)};
+          .loss_factor = LossFactorOf(material),
+          .material = material};
 }
 
 MeshingSettings MeshingOf(const worker::v1::WorkerRequest& request) {

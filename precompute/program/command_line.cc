@@ -20,6 +20,7 @@
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_file.h"
 #include "proto/cpp/program/settings_options.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -27,7 +28,8 @@ namespace {
 
 /// The options that take more than a field of the request to understand, as written.
 struct Options {
-  std::string format, material, request_file;
+  std::string format, request_file;
+  std::vector<std::string> materials;
   std::string band;
   std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
   std::optional<double> lambda_pa, mu_pa;
@@ -58,7 +60,10 @@ absl::Status InvalidOption(absl::string_view message) {
 
 void AddMaterialOptions(CLI::App& app, Options& options) {
   const std::string group = kMaterialGroup;
-  app.add_option("--material", options.material, "A preset; the figures below override it")
+  app.add_option("--material", options.materials,
+                 "A preset, or REGION=PRESET for a region of the file; the figures below override "
+                 "the first")
+      ->allow_extra_args(false)
       ->group(group);
   app.add_option("--young", options.young_pa, "Young's modulus, Pa")->group(group);
   app.add_option("--poisson", options.poisson_ratio, "Poisson's ratio, above -1 and below 0.5")
@@ -231,13 +236,22 @@ absl::Status NamingOptions(const absl::Status& refusal) {
 /// The material with every figure present; damping that nobody gave is none.
 absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
   v1::Material material;
-  material.set_preset(options.material);
+  std::vector<std::string> regions;
+  for (const std::string& text : options.materials) {
+    const bool is_region = absl::StrContains(text, '=');
+    if (is_region) regions.push_back(text);
+    if (!is_region && !material.preset().empty()) {
+      return InvalidOption("--material is given twice: only regions have several (REGION=NAME)");
+    }
+    if (!is_region) material.set_preset(text);
+  }
+  const bool is_named = !options.materials.empty();
   RETURN_IF_ERROR(SetElasticity(options, material));
   if (options.density_kg_per_m3) material.set_density_kg_per_m3(*options.density_kg_per_m3);
-  if (options.alpha1_s || options.material.empty()) {
+  if (options.alpha1_s || !is_named) {
     material.set_alpha1_s(options.alpha1_s.value_or(0));
   }
-  if (options.alpha2_per_s || options.material.empty()) {
+  if (options.alpha2_per_s || !is_named) {
     material.set_alpha2_per_s(options.alpha2_per_s.value_or(0));
   }
   if (!options.loss_factor.empty()) {
@@ -245,7 +259,8 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
                      ReadLossFactor(options.loss_factor));
     SetLossFactor(points, material);
   }
-  RETURN_IF_ERROR(CheckComplete(material));
+  if (regions.empty() || material.ByteSizeLong() > 0) RETURN_IF_ERROR(CheckComplete(material));
+  AddRegions(regions, material);
   absl::StatusOr<v1::Material> resolved = ResolveMaterial(material);
   if (!resolved.ok()) return NamingOptions(resolved.status());
   return resolved;

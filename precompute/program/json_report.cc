@@ -10,6 +10,8 @@
 #include <numbers>
 
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/region_properties.h"
 
 namespace carillon::precompute {
 namespace {
@@ -90,14 +92,31 @@ Json RadiationSummary(const Transfer& transfer) {
           {"modes_computed", std::ranges::count_if(transfer.modes, &ModeRadiation::computed)}};
 }
 
+/// The decay rate of a mode by the damping of the material or, weighted by their energies, of those
+/// of the regions.
+double DecayRatePerS(const ModalModel& model, size_t m, const IntendedUse& use) {
+  if (model.regions.empty()) return use.DecayRatePerS(model.eigenvalues[m]);
+  const double omega = std::sqrt(std::max(0.0, use.Eigenvalue(model.eigenvalues[m])));
+  double rate = 0;
+  for (const ModelRegion& region : model.regions) {
+    const v1::Material& material = *FindRegion(use.material, region.material.region);
+    const double eta = LossFactorAt(LossFactorOf(material), use.FrequencyHz(model.eigenvalues[m]));
+    rate += (region.strain_parts[m] * (material.alpha1_s() * omega + eta) * omega +
+             region.kinetic_parts[m] * material.alpha2_per_s()) /
+            2;
+  }
+  return rate;
+}
+
 Json ModesInBand(const ModalModel& model, const Transfer* transfer, const IntendedUse& use) {
   Json modes = Json::array();
   for (size_t m = 0; m < model.eigenvalues.size(); ++m) {
     const double eigenvalue = model.eigenvalues[m];
     if (eigenvalue < use.UnitEigenvalue(use.low_hz)) continue;
+    const double decay_per_s = DecayRatePerS(model, m, use);
     modes.push_back({{"frequency_hz", use.FrequencyHz(eigenvalue)},
-                     {"damped_frequency_hz", use.DampedFrequencyHz(eigenvalue)},
-                     {"decay_rate_per_s", use.DecayRatePerS(eigenvalue)},
+                     {"damped_frequency_hz", use.DampedFrequencyHz(eigenvalue, decay_per_s)},
+                     {"decay_rate_per_s", decay_per_s},
                      {"residual", model.residuals[m]},
                      {"estimated_error", model.estimated_errors[m]}});
     if (transfer == nullptr) continue;
@@ -122,7 +141,8 @@ Json BodyOf(const ModalModel& model, const IntendedUse& use) {
   Json extent_m = Json::array();
   for (size_t i = 0; i < 3; ++i) extent_m.push_back(use.size * (double{high[i]} - double{low[i]}));
   const double volume_m3 = model.volume_m3 * std::pow(use.size, 3);
-  return {{"mass_kg", use.density_kg_per_m3 * volume_m3},
+  const double unit_mass = model.mass_moments.empty() ? model.volume_m3 : model.mass_moments[0];
+  return {{"mass_kg", use.density_kg_per_m3 * unit_mass * std::pow(use.size, 3)},
           {"volume_m3", volume_m3},
           {"extent_m", extent_m}};
 }

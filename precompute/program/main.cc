@@ -19,6 +19,7 @@
 #include "precompute/codec/read_modal_model.h"
 #include "precompute/codec/transfer_codec.h"
 #include "precompute/mesh/read/read_mesh.h"
+#include "precompute/pipeline/body_regions.h"
 #include "precompute/pipeline/decompose.h"
 #include "precompute/pipeline/radiate.h"
 #include "precompute/pipeline/remedies.h"
@@ -56,11 +57,13 @@ absl::StatusOr<StoredModel> DecomposeAndWrite(const CommandLine& asked,
 
 /// Computes the modes, or reads them where the input is a stored model; then their radiation, where
 /// it is wanted.
-absl::StatusOr<Result> Compute(const CommandLine& asked, ProgressReporter& reporter) {
+absl::StatusOr<Result> Compute(CommandLine& asked, ProgressReporter& reporter) {
   const bool stored = asked.request.radiate_stored_model();
   Result result;
   ASSIGN_OR_RETURN(result.stored,
                    stored ? ReadModalModel(asked.input) : DecomposeAndWrite(asked, reporter));
+  if (stored)
+    RETURN_IF_ERROR(TakeReference(result.stored.model, *asked.request.mutable_material()));
   if (asked.request.has_transfer()) {
     ASSIGN_OR_RETURN(result.transfer, Radiate(result.stored.model, asked.request, reporter));
     RETURN_IF_ERROR(WriteTransfer(asked.transfer_output, *result.transfer, result.stored));
@@ -132,7 +135,7 @@ int FinishOutput() {
   return EXIT_FAILURE;
 }
 
-int Run(const CommandLine& asked) {
+int Run(CommandLine asked) {
   // Whoever takes events runs the program with meshes of others.
   if (asked.event_descriptor >= 0) ConfineWrites(FilesToWrite(asked));
   SetThreadCount(asked.thread_count);
@@ -172,7 +175,7 @@ int Main(int argc, char** argv) {
   RestartWithFastBlas(argv);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGCHLD, SIG_DFL);  // the ends of meshing processes are lost while it is ignored
-  const absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
+  absl::StatusOr<CommandLine> asked = ParseCommandLine(argc, argv);
   if (!asked.ok()) {
     // The options could not be read, so --json is looked for by itself.
     const bool json =
@@ -183,7 +186,7 @@ int Main(int argc, char** argv) {
     std::fputs(asked->message->c_str(), stdout);
     return FinishOutput();
   }
-  return Run(*asked);
+  return Run(*std::move(asked));
 }
 
 }  // namespace

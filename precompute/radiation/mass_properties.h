@@ -18,6 +18,10 @@ struct MassProperties {
   std::array<double, 6> inertia{};
 };
 
+/// Returns the mass properties of a body with these moments about the origin: the mass, which
+/// stands for the volume, the first moments x, y, z, and the second moments xx, yy, zz, xy, yz, zx.
+MassProperties FromMoments(std::span<const double, 10> moments);
+
 /// Computes the mass properties by the divergence theorem from a closed surface, including the
 /// walls of voids.
 MassProperties ComputeMassProperties(std::span<const std::array<float, 3>> vertices,

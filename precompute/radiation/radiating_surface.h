@@ -18,6 +18,8 @@ struct SurfaceModes {
   std::span<const std::array<int32_t, 3>> triangles;
   std::span<const double> eigenvalues;  ///< 1/s^2
   std::span<const float> shapes;        ///< #vertices by 3 by #modes, row-major
+  /// The moments of FromMoments (mass_properties.h); empty for a body of unit density.
+  std::span<const double> mass_moments = {};
   size_t mode_count() const { return eigenvalues.size(); }
 };
 

@@ -83,7 +83,9 @@ class TransferSolver {
                  .modes = std::vector<ModeRadiation>(modes.mode_count()),
                  .rigid = {},
                  .cpu_s = 0};
-    transfer_.rigid.mass = ComputeMassProperties(modes.vertices, modes.triangles);
+    transfer_.rigid.mass = modes.mass_moments.size() == 10
+                               ? FromMoments(modes.mass_moments.first<10>())
+                               : ComputeMassProperties(modes.vertices, modes.triangles);
     std::vector<double> wavenumbers;
     for (size_t m = 0; m < modes.mode_count(); ++m) {
       wavenumbers.push_back(settings.speed_ratio * std::sqrt(std::max(0.0, modes.eigenvalues[m])));

@@ -5,9 +5,11 @@
 #include <set>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/fixture_text.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
 
@@ -91,6 +93,18 @@ std::string FixtureLines(const v1::DecompositionSettings& settings) {
   return text;
 }
 
+/// One line for each region of a body of several materials.
+std::string RegionLines(const v1::DecompositionSettings& settings) {
+  std::string text;
+  for (const v1::RegionProperties& region : settings.regions()) {
+    absl::StrAppend(&text, "region ", ShortestDecimal(region.relative_young()), " ",
+                    ShortestDecimal(region.relative_density()), " ",
+                    std::lround(region.poisson_ratio() * kPoissonSteps), " ",
+                    absl::CEscape(region.region()), "\n");
+  }
+  return text;
+}
+
 }  // namespace
 
 double RoundedPoissonRatio(double poisson_ratio) {
@@ -119,6 +133,7 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
   }
   RETURN_IF_ERROR(CheckFigures(settings));
   RETURN_IF_ERROR(CheckFixtures(settings));
+  RETURN_IF_ERROR(CheckRegions(settings));
   if (settings.keep_mode_count() > kMaxKeptModeCount) {
     return Invalid(absl::StrCat("keep_mode_count is ", settings.keep_mode_count(),
                                 "; it must be at most ", kMaxKeptModeCount));
@@ -134,7 +149,7 @@ std::string SettingsText(const v1::DecompositionSettings& settings) {
       "metres_per_unit ", ShortestDecimal(settings.metres_per_unit()), "\n",  //
       "keep_surface ", KeepSurface(settings.mesh()), "\n",                    //
       "target_node_count ", settings.mesh().target_node_count(), "\n",        //
-      LaterLines(settings), FixtureLines(settings));
+      LaterLines(settings), FixtureLines(settings), RegionLines(settings));
 }
 
 }  // namespace carillon

@@ -5,9 +5,13 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <map>
 #include <numbers>
+#include <utility>
 
 #include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/near_names.h"
@@ -93,14 +97,8 @@ absl::Status Check(const v1::Material& m) {
   return CheckLossFactor(m);
 }
 
-}  // namespace
-
-const v1::MaterialCatalogue& Materials() {
-  static const v1::MaterialCatalogue catalogue = ParseMaterials();
-  return catalogue;
-}
-
-absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
+/// Resolves a material without regard to its regions.
+absl::StatusOr<v1::Material> ResolveOne(const v1::Material& material) {
   v1::Material resolved;
   if (!material.preset().empty()) {
     ASSIGN_OR_RETURN(resolved, FindPreset(material.preset()));
@@ -114,6 +112,54 @@ absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
   }
   RETURN_IF_ERROR(Check(resolved));
   return resolved;
+}
+
+absl::Status InvalidRegion(const std::string& region, absl::string_view what) {
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrCat("the region \"", absl::CEscape(region), "\" ", what));
+}
+
+/// Resolves the materials of regions, and makes the first one the reference.
+absl::StatusOr<v1::Material> ResolveRegions(const v1::Material& material) {
+  std::map<std::string, v1::Material> of_regions;
+  for (const v1::RegionMaterial& entry : material.regions()) {
+    if (!entry.material().regions().empty()) {
+      return InvalidRegion(entry.region(), "has regions of its own: give it one material");
+    }
+    ASSIGN_OR_RETURN(v1::Material resolved, ResolveOne(entry.material()));
+    const std::string name = absl::AsciiStrToLower(entry.region());
+    if (!of_regions.emplace(name, std::move(resolved)).second) {
+      return InvalidRegion(entry.region(), "has two materials: give it one");
+    }
+  }
+  v1::Material resolved = of_regions.begin()->second;
+  if (!material.preset().empty()) {
+    return InvalidRegion("",
+                         "has the material that the preset beside the regions names: give it "
+                         "an entry without a name");
+  }
+  if (material.has_young_pa()) resolved.set_young_pa(material.young_pa());
+  if (material.has_density_kg_per_m3()) {
+    resolved.set_density_kg_per_m3(material.density_kg_per_m3());
+  }
+  RETURN_IF_ERROR(Check(resolved));
+  for (auto& [name, one] : of_regions) {
+    v1::RegionMaterial& added = *resolved.add_regions();
+    added.set_region(name);
+    *added.mutable_material() = std::move(one);
+  }
+  return resolved;
+}
+
+}  // namespace
+
+const v1::MaterialCatalogue& Materials() {
+  static const v1::MaterialCatalogue catalogue = ParseMaterials();
+  return catalogue;
+}
+
+absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material) {
+  return material.regions().empty() ? ResolveOne(material) : ResolveRegions(material);
 }
 
 std::vector<LossFactorPoint> LossFactorOf(const v1::Material& material) {

@@ -16,10 +16,12 @@ const v1::MaterialCatalogue& Materials();
 
 /// Returns a material with every figure present and no preset. Figures of `material` override those
 /// of the preset that it names. Damping of either law replaces the loss factor of the preset.
-/// Poisson's ratio stays absent if neither has it. Checks that the figures are finite and within
-/// the ranges that material.proto states. Errors: InvalidArgument, with a message that begins
-/// "UNKNOWN_MATERIAL: " (no such preset; the message lists the presets, the nearest first) or
-/// "INVALID_MATERIAL: " (a figure is missing or out of range).
+/// Poisson's ratio stays absent if neither has it. Regions come back in alphabetical order, an
+/// empty name first, which stands for all other regions. The figures outside the regions are those
+/// of the first one, except a Young's modulus and a density that are given. Checks that the figures
+/// are finite and within the ranges that material.proto states. Errors: InvalidArgument, with a
+/// message that begins "UNKNOWN_MATERIAL: " (no such preset; the message lists the presets, the
+/// nearest first) or "INVALID_MATERIAL: " (a figure is missing or out of range).
 absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material);
 
 std::vector<LossFactorPoint> LossFactorOf(const v1::Material& material);

@@ -62,11 +62,17 @@ ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& loca
     const std::array<float, 3>& vertex = model.vertices[located.vertices[i]];
     for (size_t axis = 0; axis < 3; ++axis) point[axis] += located.weights[i] * vertex[axis];
   }
-  return {.young_pa = object.properties.material.young_pa,
-          .poisson_ratio = model.poisson_ratio,
-          .mass_kg = MassKg(object),
-          .curvature_per_m = object.body->curvature.At(model.given_triangle[located.triangle],
-                                                       point, object.properties.material.size)};
+  const uint32_t given = model.given_triangle[located.triangle];
+  const SoundingMaterial& material = object.properties.material;
+  ElasticBody body{.young_pa = material.young_pa,
+                   .poisson_ratio = model.poisson_ratio,
+                   .mass_kg = MassKg(object),
+                   .curvature_per_m = object.body->curvature.At(given, point, material.size)};
+  if (model.regions.empty()) return body;
+  const size_t region = model.given_triangle_regions[given];
+  body.young_pa = material.regions[region].young_pa;
+  body.poisson_ratio = model.regions[region].poisson_ratio;
+  return body;
 }
 
 double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1], vector[2]); }

@@ -61,14 +61,14 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
   const ModalModel& of = *model;
   SurfaceCurvature curvature(of.given_vertices, of.given_triangles);
   const SharpEdges edges(of.given_vertices, curvature.sharp_edges());
-  return std::make_shared<const SoundingBody>(
-      SoundingBody{.model = std::move(model),
-                   .shapes = std::move(shapes),
-                   .locator = std::move(locator),
-                   .curvature = std::move(curvature),
-                   .edges = edges,
-                   .volume_m3 = VolumeM3(of.vertices, of.triangles),
-                   .extent_m = ExtentM(of.vertices)});
+  return std::make_shared<const SoundingBody>(SoundingBody{
+      .model = std::move(model),
+      .shapes = std::move(shapes),
+      .locator = std::move(locator),
+      .curvature = std::move(curvature),
+      .edges = edges,
+      .volume_m3 = of.regions.empty() ? VolumeM3(of.vertices, of.triangles) : of.mass_kg,
+      .extent_m = ExtentM(of.vertices)});
 }
 
 }  // namespace

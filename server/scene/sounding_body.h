@@ -24,8 +24,10 @@ struct SoundingBody {
   std::unique_ptr<const SurfaceLocator> locator;
   SurfaceCurvature curvature;  ///< curvature of the surface as given
   SharpEdges edges;            ///< edges of the surface as given
-  double volume_m3 = 0;        ///< volume at the model's size; zero if unknown
-  double extent_m = 0;         ///< the diagonal of the bounding box at the model's size
+  /// Volume at the model's size, or zero if unknown. For a body of several materials, the volume of
+  /// the reference material that has the body's mass.
+  double volume_m3 = 0;
+  double extent_m = 0;  ///< the diagonal of the bounding box at the model's size
 };
 
 /// Makes the body of a model once, and returns the same body as long as any object uses it. Safe

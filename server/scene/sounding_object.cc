@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -20,6 +21,80 @@ constexpr double kLargestSize = 1000;
 constexpr double kLargestGain = 1000;
 /// Models round Poisson's ratio to 1e-4. The remainder allows for the rounding of the difference.
 constexpr double kPoissonTolerance = 1.0001e-4;
+
+/// Largest relative difference of two factors that count as the same.
+constexpr double kSameFactor = 1e-6;
+
+absl::Status Differs(absl::string_view what) {
+  return Refusal(absl::StatusCode::kFailedPrecondition, "REGION_MATERIAL_DIFFERS", what);
+}
+
+/// Returns the material of a region, or null if there is none.
+const RegionMaterial* Find(const SoundingMaterial& material, const std::string& region) {
+  for (const std::string& name : {region, std::string()}) {
+    const auto found = std::ranges::find_if(material.regions, [&](const RegionMaterial& one) {
+      return absl::EqualsIgnoreCase(one.region, name);
+    });
+    if (found != material.regions.end()) return &*found;
+  }
+  return nullptr;
+}
+
+bool IsSame(double factor, double first) { return std::abs(factor / first - 1) <= kSameFactor; }
+
+/// Gives `material` the regions of the model, in the model's order, and its reference. Names are
+/// compared without regard to the case of letters. The materials of the regions must be those that
+/// the model was computed for, except for factors of Young's modulus and density that are common to
+/// all regions. A model of one material leaves `material` as it is. Errors: FailedPrecondition
+/// (REGION_MATERIAL_DIFFERS).
+absl::Status MatchRegions(const ModalModel& model, SoundingMaterial& material) {
+  if (model.regions.empty() && material.regions.empty()) return absl::OkStatus();
+  if (model.regions.empty() || material.regions.empty()) {
+    return Differs(
+        model.regions.empty()
+            ? "the material has regions, and the model was computed for one material: "
+              "give one material, or create the model with these regions"
+            : "the model was computed for several materials, and one is given: give each "
+              "region its material, or none, and the object gets those of the model");
+  }
+  std::vector<RegionMaterial> matched;
+  for (const ModelRegion& region : model.regions) {
+    const RegionMaterial* const found = Find(material, region.name);
+    if (found == nullptr) {
+      return Differs(absl::StrCat("the region \"", region.name,
+                                  "\" of the model has no material: give it one"));
+    }
+    RegionMaterial& one = matched.emplace_back(*found);
+    one.region = region.name;
+    const double young_pa = one.young_pa / region.relative_young;
+    const double density_kg_per_m3 = one.density_kg_per_m3 / region.relative_density;
+    if (matched.size() == 1) {
+      material.young_pa = young_pa;
+      material.density_kg_per_m3 = density_kg_per_m3;
+    }
+    const double poisson_ratio = one.poisson_ratio.value_or(region.poisson_ratio);
+    if (IsSame(young_pa, material.young_pa) &&
+        IsSame(density_kg_per_m3, material.density_kg_per_m3) &&
+        std::abs(poisson_ratio - region.poisson_ratio) <= kPoissonTolerance) {
+      continue;
+    }
+    return Differs(absl::StrCat(
+        "the material of the region \"", region.name,
+        "\" differs from that of the model by another factor than that of \"",
+        model.regions[0].name, "\", or in Poisson's ratio: create a model with these materials"));
+  }
+  material.regions = std::move(matched);
+  return absl::OkStatus();
+}
+
+/// Returns the parts of the energies of each region of the model.
+std::vector<EnergyParts> EnergyPartsOf(const ModalModel& model) {
+  std::vector<EnergyParts> parts;
+  for (const ModelRegion& region : model.regions) {
+    parts.push_back({region.strain_energy_parts, region.kinetic_energy_parts});
+  }
+  return parts;
+}
 
 absl::Status OutOfRange(absl::string_view what, double value, double least, double most) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
@@ -35,6 +110,7 @@ absl::Status Check(const ModalModel& model, const ObjectProperties& properties) 
     return OutOfRange("gain", properties.gain, 0, kLargestGain);
   }
   if (properties.pose) RETURN_IF_ERROR(Validate(*properties.pose));
+  if (!model.regions.empty()) return absl::OkStatus();  // each region has its ratio
   const double wanted = properties.poisson_ratio.value_or(model.poisson_ratio);
   if (std::abs(wanted - model.poisson_ratio) <= kPoissonTolerance) return absl::OkStatus();
   absl::Status status = Refusal(
@@ -126,7 +202,8 @@ absl::StatusOr<SoundingModes> SelectModes(const ModalModel& model,
                                           const ObjectProperties& properties,
                                           const Transfer* transfer, double sample_rate_hz,
                                           const SoundingBand& band) {
-  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer)};
+  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer),
+                        EnergyPartsOf(model)};
   SoundingModes sounding = SelectSoundingModes(table, properties.material, sample_rate_hz, band);
   if (!sounding.modes.empty() || Clicks(transfer, properties)) return sounding;
   return NoModeInBand(model, properties.material, band);
@@ -168,19 +245,23 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
                               " m/s: compute it first (CreateTransfer, carillon transfer --wait)"));
 }
 
-absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& properties,
+absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& asked,
                          double sample_rate_hz, TransferStore* transfers) {
+  ObjectProperties properties = asked;
+  RETURN_IF_ERROR(MatchRegions(model, properties.material));
   RETURN_IF_ERROR(Check(model, properties));
   ASSIGN_OR_RETURN(const auto transfer, ChooseTransfer(model, properties, transfers));
   return SelectModes(model, properties, transfer.get(), sample_rate_hz, {}).status();
 }
 
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& properties,
+                                                  const ObjectProperties& asked,
                                                   const MixerBus& output,
                                                   std::shared_ptr<Voice> voice,
                                                   TransferStore* transfers) {
   const ModalModel& model = *body->model;
+  ObjectProperties properties = asked;
+  RETURN_IF_ERROR(MatchRegions(model, properties.material));
   RETURN_IF_ERROR(Check(model, properties));
   const MixerSettings& settings = output.mixer.settings();
   ASSIGN_OR_RETURN(std::shared_ptr<const Transfer> transfer,

@@ -80,7 +80,7 @@ absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel&
 
 /// Checks that an object of the model with these properties would sound at this sampling rate.
 /// Errors: those of MakeSoundingObject, except TOO_MANY_OBJECTS.
-absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& properties,
+absl::Status CheckSounds(const ModalModel& model, const ObjectProperties& asked,
                          double sample_rate_hz, TransferStore* transfers);
 
 /// A bus of a mixer.
@@ -91,10 +91,10 @@ struct MixerBus {
 
 /// Applies material and size to a model, and puts its oscillator bank with `voice` on a bus.
 /// Errors: InvalidArgument (INVALID_SETTINGS: size or gain out of range; INVALID_POSE),
-/// FailedPrecondition (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz),
-/// ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer.
+/// FailedPrecondition (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz,
+/// REGION_MATERIAL_DIFFERS), ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer.
 absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& properties,
+                                                  const ObjectProperties& asked,
                                                   const MixerBus& output,
                                                   std::shared_ptr<Voice> voice = nullptr,
                                                   TransferStore* transfers = nullptr);

@@ -222,7 +222,7 @@ class ModelCreation {
     members.push_back({"node_count", uint64_t{model->header().node_count()}});
     const auto asked = ToMaterial(options_.material);
     const bool named = asked.ok() && asked->ByteSizeLong() > 0;
-    const auto material = ResolveMaterial(named ? *asked : model->material());
+    const auto material = MatchedMaterial(*model, named ? *asked : model->material());
     if (!material.ok()) return;
     for (JsonMember& member : ModeMembers(ModesOf(*model, *material, options_.size))) {
       members.push_back(std::move(member));

@@ -11,6 +11,7 @@
 #include "proto/cpp/loss_factor.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/program/escaped_text.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
@@ -31,9 +32,8 @@ absl::StatusOr<v1::Material> ReadMaterial(const std::string& path) {
                               "fit --out wrote, or lines such as young_pa: 70e9"));
 }
 
-}  // namespace
-
-absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
+/// Converts the figures without regard to the regions.
+absl::StatusOr<v1::Material> ToOneMaterial(const MaterialFigures& figures) {
   v1::Material material;
   if (!figures.file.empty()) {
     ASSIGN_OR_RETURN(material, ReadMaterial(figures.file));
@@ -56,6 +56,14 @@ absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
   const double lambda = *figures.lame_lambda_pa, mu = *figures.lame_mu_pa;
   material.set_young_pa(mu * (3 * lambda + 2 * mu) / (lambda + mu));
   material.set_poisson_ratio(lambda / (2 * (lambda + mu)));
+  return material;
+}
+
+}  // namespace
+
+absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures) {
+  ASSIGN_OR_RETURN(v1::Material material, ToOneMaterial(figures));
+  AddRegions(figures.regions, material);
   return material;
 }
 

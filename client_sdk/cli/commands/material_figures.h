@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/material.pb.h"
@@ -14,6 +15,7 @@ namespace carillon::cli {
 struct MaterialFigures {
   std::string preset;
   std::string file;  ///< a Material as text, which the other figures override; empty: none
+  std::vector<std::string> regions;  ///< "REGION=NAME", a named material for each
   std::optional<double> young_pa;
   std::optional<double> poisson_ratio;
   std::optional<double> lame_lambda_pa;

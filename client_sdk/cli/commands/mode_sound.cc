@@ -5,6 +5,8 @@
 #include <numbers>
 
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/region_properties.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -30,6 +32,12 @@ const v1::TransferSummary* FittingTransfer(const v1::ModalModelSummary& model,
 
 double ModeSound::T60() const { return std::log(1000) / decay_per_s(); }
 
+absl::StatusOr<v1::Material> MatchedMaterial(const v1::ModalModelSummary& model,
+                                             const v1::Material& material) {
+  ASSIGN_OR_RETURN(const v1::Material resolved, ResolveMaterial(material));
+  return MatchRegions(model.header(), resolved);
+}
+
 std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Material& material,
                                double size) {
   const v1::TransferSummary* const transfer = FittingTransfer(model, material);
@@ -39,7 +47,7 @@ std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Mat
     const double omega2 = model.eigenvalues(i) * material.young_pa() / density / (size * size);
     ModeSound mode;
     mode.natural_hz = std::sqrt(omega2) / (2 * std::numbers::pi);
-    mode.material_decay_per_s = DecayRatePerS(material, mode.natural_hz);
+    mode.material_decay_per_s = DecayRatePerS(model.header(), material, i, mode.natural_hz);
     if (transfer != nullptr) {
       const v1::TransferHeader& air = transfer->header();
       mode.radiation_decay_per_s = air.air_density_kg_per_m3() * omega2 * size *

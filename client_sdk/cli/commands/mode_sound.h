@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "carillon/client.h"
 #include "client_sdk/cli/output/message_json.h"
 
@@ -26,8 +27,13 @@ struct ModeSound {
   double T60() const;
 };
 
-/// Returns the modes of a body of the resolved `material`, `size` times as large as the model: the
-/// natural frequency is sqrt(Lambda E/rho)/(2 pi size), and the decay by radiation is
+/// Resolves a material for a model, see MatchRegions (region_properties.h). Errors: those of
+/// ResolveMaterial and MatchRegions.
+absl::StatusOr<v1::Material> MatchedMaterial(const v1::ModalModelSummary& model,
+                                             const v1::Material& material);
+
+/// Returns the modes of a body of a `material` of MatchedMaterial, `size` times as large as the
+/// model: the natural frequency is sqrt(Lambda E/rho)/(2 pi size), and the decay by radiation is
 /// rho_air omega^2 I size/(2 c rho) with the power integral I of a transfer (transfer.proto).
 std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Material& material,
                                double size = 1);

@@ -131,7 +131,7 @@ double SoundSpeed(const v1::Material& resolved) {
 /// Warns if no object of `material` can have the model, which was made for another Poisson's ratio,
 /// and if objects of the model's own material will not sound by a transfer for this one.
 void WarnOfMaterial(const v1::ModalModelSummary& model, const v1::Material& material) {
-  const absl::StatusOr<v1::Material> wanted = ResolveMaterial(material);
+  const absl::StatusOr<v1::Material> wanted = MatchedMaterial(model, material);
   if (!wanted.ok()) return;  // the daemon says why
   const double poisson = model.header().settings().poisson_ratio();
   if (wanted->has_poisson_ratio() &&
@@ -143,7 +143,7 @@ void WarnOfMaterial(const v1::ModalModelSummary& model, const v1::Material& mate
         "its objects, or create a model for the material\n",
         wanted->poisson_ratio(), poisson, poisson);
   }
-  const absl::StatusOr<v1::Material> own = ResolveMaterial(model.material());
+  const absl::StatusOr<v1::Material> own = MatchedMaterial(model, model.material());
   if (!model.has_material() || !own.ok()) return;
   if (std::abs(std::log(SoundSpeed(*own) / SoundSpeed(*wanted))) > kSpeedTolerance) {
     absl::FPrintF(
@@ -161,6 +161,8 @@ void Shorten(v1::ModalModelSummary& model) {
   model.mutable_header()->clear_arrays();
   model.mutable_header()->clear_estimated_errors();
   model.mutable_header()->clear_poisson_slopes();
+  model.mutable_header()->clear_regions();
+  model.mutable_header()->clear_given_triangle_regions();
 }
 
 }  // namespace
@@ -217,10 +219,10 @@ absl::Status ShowModel(const client::Client& daemon, const std::string& text,
   ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
   ASSIGN_OR_RETURN(const auto model, daemon.GetModalModel(name));
   ASSIGN_OR_RETURN(const auto given, ToMaterial(figures));
-  const bool is_given = !given.preset().empty() || given.has_young_pa();
+  const bool is_given = given.ByteSizeLong() > 0;
   const v1::Material& chosen = is_given ? given : model.material();
   const bool has_material = is_given || model.has_material();
-  ASSIGN_OR_RETURN(const auto material, has_material ? ResolveMaterial(chosen) : chosen);
+  ASSIGN_OR_RETURN(const auto material, has_material ? MatchedMaterial(model, chosen) : chosen);
   if (json) {
     std::vector<JsonMember> members;
     if (has_material) members = ModeMembers(ModesOf(model, material));

@@ -42,11 +42,7 @@ std::string FormatOf(const std::string& file, const std::string& format) {
 
 bool IsGltf(const std::string& format) { return format == "glb" || format == "gltf"; }
 
-bool IsGiven(const v1::Material& material) {
-  return !material.preset().empty() || material.has_young_pa() || material.has_poisson_ratio() ||
-         material.has_density_kg_per_m3() || material.has_alpha1_s() ||
-         material.has_alpha2_per_s() || material.loss_factor_size() > 0;
-}
+bool IsGiven(const v1::Material& material) { return material.ByteSizeLong() > 0; }
 
 /// Returns the material of the command line for an export, which only a glTF needs.
 absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
@@ -75,6 +71,11 @@ absl::Status WriteGltf(const client::Client& daemon, const std::string& name,
                    "was stored without one; give --material");
   }
   ASSIGN_OR_RETURN(v1::Material material, ResolveMaterial(chosen));
+  if (!summary.header().regions().empty()) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   "a glTF holds a body of one material, and this model has several; export it "
+                   "without a format, or as npz");
+  }
   ASSIGN_OR_RETURN(const StoredModel model, Fetch(daemon, name));
   if (!material.has_poisson_ratio()) {
     material.set_poisson_ratio(model.header.settings().poisson_ratio());

@@ -32,13 +32,19 @@ constexpr double kStep = 0.001;       // seconds; there is one step only
 double SoundingSeconds(const v1::SoundingObject& object) {
   if (object.sounding_mode_count() == 0) return 1;  // a click
   const v1::Material& material = object.material();
-  double sigma = DecayRatePerS(material, object.lowest_frequency_hz());
-  sigma = std::min(sigma, DecayRatePerS(material, object.highest_frequency_hz()));
-  for (const v1::LossFactorPoint& point : material.loss_factor()) {
-    const double hz = std::clamp(point.frequency_hz(), object.lowest_frequency_hz(),
-                                 object.highest_frequency_hz());
-    sigma = std::min(sigma, DecayRatePerS(material, hz));
-  }
+  double sigma = HUGE_VAL;
+  const auto take = [&](const v1::Material& one) {
+    sigma = std::min({sigma, DecayRatePerS(one, object.lowest_frequency_hz()),
+                      DecayRatePerS(one, object.highest_frequency_hz())});
+    for (const v1::LossFactorPoint& point : one.loss_factor()) {
+      const double hz = std::clamp(point.frequency_hz(), object.lowest_frequency_hz(),
+                                   object.highest_frequency_hz());
+      sigma = std::min(sigma, DecayRatePerS(one, hz));
+    }
+  };
+  // A mode of a body of several materials decays no slower than it would in the least damped one.
+  for (const v1::RegionMaterial& region : material.regions()) take(region.material());
+  if (material.regions().empty()) take(material);
   return std::min(kLongestSound, std::log(1000) / sigma);
 }
 
@@ -230,7 +236,7 @@ absl::Status StrikeToFile(const client::Client& daemon, const StrikeOptions& opt
   ASSIGN_OR_RETURN(const v1::ModalModelSummary model, daemon.GetModalModel(object.modal_model()));
   ASSIGN_OR_RETURN(*object.mutable_material(), ToMaterial(options.material));
   if (object.material().ByteSizeLong() == 0) *object.mutable_material() = model.material();
-  ASSIGN_OR_RETURN(const v1::Material material, ResolveMaterial(object.material()));
+  ASSIGN_OR_RETURN(const v1::Material material, MatchedMaterial(model, object.material()));
   object.set_handle(1);
   object.set_size(options.size);
   object.set_gain(options.gain);

@@ -2,6 +2,8 @@
 #include "client_sdk/cli/options/material_options.h"
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
 namespace carillon::cli {
 namespace {
@@ -15,8 +17,21 @@ void AddFigure(CLI::App& app, const std::string& name, std::optional<T>& target,
 }  // namespace
 
 void AddMaterial(CLI::App& app, MaterialFigures& material) {
-  app.add_option("--material", material.preset,
-                 "A named material; the figures below override its own")
+  app.add_option_function<std::vector<std::string>>(
+         "--material",
+         [&material](const std::vector<std::string>& texts) {
+           for (const std::string& text : texts) {
+             const bool is_region = text.find('=') != std::string::npos;
+             if (!is_region && !material.preset.empty()) {
+               throw CLI::ValidationError("--material", "only regions have several materials");
+             }
+             if (is_region) material.regions.push_back(text);
+             if (!is_region) material.preset = text;
+           }
+         },
+         "A named material, or REGION=NAME for a region of the mesh file; the figures below "
+         "override those of the first")
+      ->allow_extra_args(false)
       ->group("Material");
   app.add_option("--material-file", material.file,
                  "A file with a material as text, as carillon material fit writes it; the figures "

@@ -20,6 +20,7 @@
 #include "proto/cpp/mesh_format.h"
 #include "proto/cpp/program/parsed_option.h"
 #include "proto/cpp/program/settings_options.h"
+#include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
@@ -173,6 +174,7 @@ void AddModelList(CLI::App& app, Program& program) {
 void AddModelTag(CLI::App& app, Program& program) {
   auto model = std::make_shared<std::string>();
   auto change = std::make_shared<v1::UpdateModalModelRequest>();
+  auto material = std::make_shared<MaterialFigures>();  // of objects that name none
   CLI::App& tag = *app.add_subcommand("tag", "Label, tag or pin a model, or set its material");
   tag.add_option("model", *model, kModelName)->required();
   tag.add_option_function<std::string>(
@@ -192,12 +194,11 @@ void AddModelTag(CLI::App& app, Program& program) {
   tag.add_flag_function(
       "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
       "Keep the model from garbage collection, or no longer");
-  tag.add_option_function<std::string>(
-      "--material",
-      [change](const std::string& name) { change->mutable_material()->set_preset(name); },
-      "The named material of objects that name none");
-  tag.callback([&program, model, change] {
-    program.command = [&program, model, change] {
+  AddMaterial(tag, *material);
+  tag.callback([&program, model, change, material] {
+    program.command = [&program, model, change, material] {
+      ASSIGN_OR_RETURN(const v1::Material objects, ToMaterial(*material));
+      if (objects.ByteSizeLong() > 0) *change->mutable_material() = objects;
       return UpdateModel(*program.Daemon(), *model, *change, program.json);
     };
   });

@@ -35,8 +35,12 @@ export type Rotation = ArrayLike<number>;
 /** Rows of numbers, flat or an array each. */
 export type Table = ArrayLike<number> | ArrayLike<ArrayLike<number>>;
 export type Pose = Vector | { position: Vector; orientation?: Rotation };
-/** A name of the catalogue, such as "bell_bronze", or figures. */
-export type Material = string | MaterialMessage;
+/** The materials of a body of several ones by the regions of its mesh file; '' stands for all regions without one. */
+export interface MaterialOfRegions {
+  regions: Record<string, string | MaterialMessage>;
+}
+/** A name of the catalogue, such as "bell_bronze", figures, or both by regions. */
+export type Material = string | MaterialMessage | MaterialOfRegions;
 /** A name of the catalogue, such as "wood", or figures. */
 export type Striker = string | HertzContact;
 export type Radiation = 'paper_coupling' | 'radiated_power' | 'modes_only';

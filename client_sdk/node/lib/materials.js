@@ -3,11 +3,18 @@
 
 const { choice, refuse, refuseNoMessage } = require('./checks');
 
-/** A name of the catalogue becomes a message; a message stays as it is. */
+/**
+ * A name of the catalogue becomes a message, and so do the materials of regions, { regions: { head: 'oak' } }; a message
+ * stays as it is.
+ */
 function toMaterial(material) {
   if (typeof material === 'string') return { preset: material };
   if (material === null || typeof material !== 'object') {
     refuse(material, 'material', "a name such as 'oak', or figures such as { youngPa, densityKgPerM3 }");
+  }
+  if (material.regions && !Array.isArray(material.regions)) {
+    const regions = Object.entries(material.regions).map(([region, own]) => ({ region, material: toMaterial(own) }));
+    return toMaterial({ ...material, regions });
   }
   refuseNoMessage(material, 'Material', 'material');
   return material;

@@ -27,6 +27,9 @@ struct OctahedronDiagonal {
 constexpr std::array<OctahedronDiagonal, 3> kDiagonals = {
     {{{4, 9}, {5, 6, 7, 8}}, {{5, 7}, {4, 6, 9, 8}}, {{6, 8}, {4, 5, 9, 7}}}};
 
+/// The tetrahedra into which one is divided.
+constexpr size_t kParts = 8;
+
 class Splitter {
  public:
   explicit Splitter(const TetMesh& mesh) : mesh_(mesh) { split_.nodes = mesh.nodes; }
@@ -34,6 +37,9 @@ class Splitter {
   TetMesh Split() && {
     for (size_t e = 0; e < mesh_.element_count(); ++e) SplitElement(&mesh_.elements[10 * e]);
     for (const BoundaryFace& face : mesh_.boundary) SplitFace(face);
+    for (const int32_t region : mesh_.regions) {
+      split_.regions.insert(split_.regions.end(), kParts, region);
+    }
     AddMidsideNodes(split_);
     Fix();
     return std::move(split_);

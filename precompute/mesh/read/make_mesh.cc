@@ -234,6 +234,7 @@ absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& 
                              "tetrahedron", node_of_number));
   WarnOfOtherFaces(file);
   TetMesh mesh{std::move(file.nodes), file.nodes_per_element, std::move(elements), {}};
+  mesh.regions = std::move(file.element_regions);
   const std::vector<int32_t> new_index = DropUnusedNodes(mesh);
   RETURN_IF_ERROR(OrientElements(mesh));
   for (const auto check : {CheckMidsideNodes, CheckOnePiece}) {
@@ -241,6 +242,7 @@ absl::StatusOr<NamedMesh> MakeTetrahedra(ElementFile& file, const NodeOfNumber& 
   }
   RETURN_IF_ERROR(FindBoundary(mesh));
   MeshNames names = NamesOf(file, node_of_number, new_index, mesh);
+  names.regions = std::move(file.regions);
   return NamedMesh{std::move(mesh), std::move(names), std::move(file.warnings)};
 }
 

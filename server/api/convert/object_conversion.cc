@@ -11,18 +11,37 @@
 namespace carillon {
 namespace {
 
+std::optional<double> PoissonRatio(const v1::Material& resolved) {
+  if (!resolved.has_poisson_ratio()) return std::nullopt;
+  return resolved.poisson_ratio();
+}
+
+RegionMaterial ToRegionMaterial(const std::string& region, const v1::Material& resolved) {
+  return {.region = region,
+          .young_pa = resolved.young_pa(),
+          .density_kg_per_m3 = resolved.density_kg_per_m3(),
+          .poisson_ratio = PoissonRatio(resolved),
+          .damping = {.alpha1_s = resolved.alpha1_s(),
+                      .alpha2_per_s = resolved.alpha2_per_s(),
+                      .loss_factor = LossFactorOf(resolved)}};
+}
+
+std::vector<RegionMaterial> RegionsOf(const v1::Material& resolved) {
+  std::vector<RegionMaterial> regions;
+  for (const v1::RegionMaterial& entry : resolved.regions()) {
+    regions.push_back(ToRegionMaterial(entry.region(), entry.material()));
+  }
+  return regions;
+}
+
 SoundingMaterial ToSoundingMaterial(const v1::Material& resolved, double size) {
   return {.young_pa = resolved.young_pa(),
           .density_kg_per_m3 = resolved.density_kg_per_m3(),
           .alpha1_s = resolved.alpha1_s(),
           .alpha2_per_s = resolved.alpha2_per_s(),
           .size = size,
-          .loss_factor = LossFactorOf(resolved)};
-}
-
-std::optional<double> PoissonRatio(const v1::Material& resolved) {
-  if (!resolved.has_poisson_ratio()) return std::nullopt;
-  return resolved.poisson_ratio();
+          .loss_factor = LossFactorOf(resolved),
+          .regions = RegionsOf(resolved)};
 }
 
 v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ratio) {
@@ -33,6 +52,17 @@ v1::Material ToProto(const ObjectProperties& properties, double model_poisson_ra
   material.set_alpha1_s(properties.material.alpha1_s);
   material.set_alpha2_per_s(properties.material.alpha2_per_s);
   SetLossFactor(properties.material.loss_factor, material);
+  for (const RegionMaterial& region : properties.material.regions) {
+    v1::RegionMaterial& entry = *material.add_regions();
+    entry.set_region(region.region);
+    v1::Material& of_region = *entry.mutable_material();
+    of_region.set_young_pa(region.young_pa);
+    of_region.set_density_kg_per_m3(region.density_kg_per_m3);
+    if (region.poisson_ratio) of_region.set_poisson_ratio(*region.poisson_ratio);
+    of_region.set_alpha1_s(region.damping.alpha1_s);
+    of_region.set_alpha2_per_s(region.damping.alpha2_per_s);
+    SetLossFactor(region.damping.loss_factor, of_region);
+  }
   return material;
 }
 

@@ -10,6 +10,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/material_catalogue.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/call/unary_call.h"
 #include "server/api/convert/object_conversion.h"
@@ -102,6 +103,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
         v1::CreateTransferRequest whole = *request;
         ASSIGN_OR_RETURN(*whole.mutable_material(),
                          MaterialOrModels(request->material(), digest, database_.models()));
+        RETURN_IF_ERROR(TakeReference(digest, *whole.mutable_material()));
         ASSIGN_OR_RETURN(
             *response->mutable_job(),
             queue_.SubmitTransfer(digest, whole, caller.client, caller.has(Role::kAdminister)));
@@ -217,6 +219,16 @@ absl::Status ModalModelService::CheckMaterial(const v1::Material& material,
   ASSIGN_OR_RETURN(const ObjectProperties properties, ToObjectProperties(material, 1, 1));
   ASSIGN_OR_RETURN(const auto model, database_.models().Find(digest));
   return CheckSounds(*model, properties, daemon_.sample_rate_hz, &database_.transfers());
+}
+
+absl::Status ModalModelService::TakeReference(const std::string& digest, v1::Material& material) {
+  const absl::StatusOr<ModelSummary> model = database_.models().Summary(digest);
+  if (!model.ok() || (material.regions().empty() && model->header.regions().empty())) {
+    return absl::OkStatus();  // the queue says why there is no model
+  }
+  ASSIGN_OR_RETURN(const v1::Material resolved, ResolveMaterial(material));
+  ASSIGN_OR_RETURN(material, MatchRegions(model->header, resolved));
+  return absl::OkStatus();
 }
 
 // Another request for a stored model does not take away a material with which its objects sound.

@@ -65,6 +65,8 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
       grpc::CallbackServerContext* context, v1::ImportModalModelResponse* response);
   absl::Status Get(const v1::GetModalModelRequest& request, v1::GetModalModelResponse& response);
   absl::Status CheckMaterial(const v1::Material& material, const std::string& digest);
+  /// Gives a material for a model of several materials the model's reference.
+  absl::Status TakeReference(const std::string& digest, v1::Material& material);
   bool MayRemember(const std::string& digest, const v1::Material& material,
                    const Principal& caller);
   absl::Status Update(const v1::UpdateModalModelRequest& request, const Principal& caller,

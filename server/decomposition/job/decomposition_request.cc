@@ -10,6 +10,7 @@
 #include "proto/cpp/limits.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_format.h"
+#include "proto/cpp/region_properties.h"
 #include "proto/cpp/status_macros.h"
 #include "server/base/sha256.h"
 #include "server/mode_database/model_store.h"
@@ -82,6 +83,7 @@ void FillIn(v1::DecompositionSettings& settings, const v1::Material& material) {
   const double poisson =
       settings.poisson_ratio() == 0 ? material.poisson_ratio() : settings.poisson_ratio();
   settings.set_poisson_ratio(RoundedPoissonRatio(poisson));
+  SetRegions(material, settings);
   FillInDefaults(settings);
 }
 

@@ -10,6 +10,16 @@
 
 namespace carillon {
 
+/// A region of a body of several materials.
+struct ModelRegion {
+  std::string name;
+  double relative_young = 1;    ///< Young's modulus, relative to that of the reference material
+  double relative_density = 1;  ///< density, relative to that of the reference material
+  double poisson_ratio = 0;
+  std::vector<float> strain_energy_parts;   ///< #m, of each mode, from 0 to 1
+  std::vector<float> kinetic_energy_parts;  ///< #m
+};
+
 /// A modal model in the server's memory, for unit Young's modulus, density and size.
 /// proto/carillon/v1/modal_model.proto states how each array scales. A model is immutable, and all
 /// objects that sound with it share it.
@@ -31,6 +41,11 @@ struct ModalModel {
   std::vector<std::array<uint32_t, 3>> given_triangles;
   /// #V by 3 by #m, row-major: shapes[(vertex * 3 + axis) * m + mode], 1/kg^(1/2).
   std::vector<float, LargeAllocator<float>> shapes;
+  /// The regions of a body of several materials, whose reference has unit Young's modulus and
+  /// density; empty if the body has one material.
+  std::vector<ModelRegion> regions = {};
+  std::vector<uint8_t> given_triangle_regions = {};  ///< #H: the region that each bounds, or empty
+  double mass_kg = 0;  ///< for a reference of unit density; zero if there are no regions
 
   size_t mode_count() const { return eigenvalues.size(); }
 };

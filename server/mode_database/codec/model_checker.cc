@@ -103,9 +103,36 @@ absl::Status ModelChecker::CheckHeader(const v1::ModalModelHeader& header) {
       return Malformed(absl::StrCat("it needs one array \"", spec.name, "\""));
     }
   }
+  RETURN_IF_ERROR(CheckRegions(header));
   header_ = header;
   has_header_ = true;
   return absl::OkStatus();
+}
+
+absl::Status ModelChecker::CheckRegions(const v1::ModalModelHeader& header) const {
+  if (header.regions().empty()) return absl::OkStatus();
+  const auto are_parts = [&](const auto& parts) {
+    return static_cast<uint32_t>(parts.size()) == header.mode_count() &&
+           std::ranges::all_of(parts, [](float part) { return part >= 0 && part <= 1; });
+  };
+  const auto is_ratio = [](double ratio) { return ratio > 0 && std::isfinite(ratio); };
+  for (const v1::ModalModelRegion& region : header.regions()) {
+    const v1::RegionProperties& properties = region.properties();
+    if (!is_ratio(properties.relative_young()) || !is_ratio(properties.relative_density()) ||
+        !(properties.poisson_ratio() > -1 && properties.poisson_ratio() < 0.5) ||
+        !are_parts(region.strain_energy_parts()) || !are_parts(region.kinetic_energy_parts())) {
+      return Malformed("a region has a figure that is impossible, or not one for each mode");
+    }
+  }
+  const std::string& of_triangles = header.given_triangle_regions();
+  const bool are_regions = std::ranges::all_of(of_triangles, [&](char region) {
+    return static_cast<unsigned char>(region) < header.regions_size();
+  });
+  if (are_regions && of_triangles.size() == dimensions_.at('H') &&
+      header.mass_moments_size() == 10 && is_ratio(header.mass_moments(0))) {
+    return absl::OkStatus();
+  }
+  return Malformed("its regions have not one number for each given triangle, or no mass");
 }
 
 absl::Status ModelChecker::CheckArray(const v1::ArrayDescriptor& array) {

@@ -44,6 +44,7 @@ class ModelChecker {
 
  private:
   absl::Status CheckHeader(const v1::ModalModelHeader& header);
+  absl::Status CheckRegions(const v1::ModalModelHeader& header) const;
   absl::Status CheckArray(const v1::ArrayDescriptor& array);
   absl::Status CheckShape(const v1::ArrayDescriptor& array);
   absl::Status CheckNumbers(const v1::ArrayDescriptor& array, std::string_view data);

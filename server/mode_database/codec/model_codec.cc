@@ -168,6 +168,20 @@ void ModelDecoder::Take(const ChunkView& chunk) {
 void ModelDecoder::MakeRoom(const v1::ModalModelHeader& header) {
   model_.poisson_ratio = header.settings().poisson_ratio();
   model_.complete_to_eigenvalue = header.complete_to_eigenvalue();
+  for (const v1::ModalModelRegion& region : header.regions()) {
+    const v1::RegionProperties& properties = region.properties();
+    const auto& strain = region.strain_energy_parts();
+    const auto& kinetic = region.kinetic_energy_parts();
+    model_.regions.push_back({.name = properties.region(),
+                              .relative_young = properties.relative_young(),
+                              .relative_density = properties.relative_density(),
+                              .poisson_ratio = properties.poisson_ratio(),
+                              .strain_energy_parts = {strain.begin(), strain.end()},
+                              .kinetic_energy_parts = {kinetic.begin(), kinetic.end()}});
+  }
+  const std::string& of_triangles = header.given_triangle_regions();
+  model_.given_triangle_regions.assign(of_triangles.begin(), of_triangles.end());
+  if (!model_.regions.empty()) model_.mass_kg = header.mass_moments(0);
   for (const v1::ArrayDescriptor& array : header.arrays()) {
     destinations_.push_back(Destination(model_, array));
   }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace carillon {
 
@@ -32,12 +33,20 @@ struct Radiation {
   double sound_speed_m_per_s = 343;  ///< in air
 };
 
+/// A region's parts of the strain and kinetic energies of each mode, from 0 to 1.
+struct EnergyParts {
+  std::span<const float> strain;   ///< #m
+  std::span<const float> kinetic;  ///< #m
+};
+
 /// The arrays of a modal model that decide how each of its modes sounds. Each array has #m numbers,
 /// one for each mode.
 struct ModeTable {
   std::span<const double> eigenvalues;  ///< ascending, unit material
   std::span<const double> couplings;    ///< the paper's c_m, unit material
   Radiation radiation = {};
+  /// One for each of SoundingMaterial::regions; empty if the body has one material.
+  std::vector<EnergyParts> regions = {};
 };
 
 }  // namespace carillon

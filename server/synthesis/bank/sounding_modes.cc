@@ -86,7 +86,7 @@ SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial
     const double eigenvalue = std::pow(2 * kPi * natural_hz, 2);
     const RadiatingMode radiating = RadiationOf(table, m, eigenvalue, material);
     const double sigma =
-        MaterialDecayRatePerS(eigenvalue, natural_hz, material) - radiating.decay_per_s;
+        MaterialDecayRatePerS(table, m, eigenvalue, natural_hz, material) - radiating.decay_per_s;
     if (!Sounds(natural_hz, eigenvalue, sigma, sample_rate_hz / 2, band)) continue;
     sounding.modes.push_back({.column = static_cast<uint32_t>(m),
                               .natural_frequency_hz = natural_hz,

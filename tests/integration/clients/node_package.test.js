@@ -231,6 +231,11 @@ test('a material and settings that the daemon told may be given back', async () 
   await withScene(async (scene) => assert.equal((await scene.add(found)).handle, 1));
 });
 
+test('a material by region reaches the mesh', async () => {
+  const refused = c.createModel(BAR, { material: { regions: { head: material, '': 'oak' } } });
+  await assert.rejects(refused, { reason: 'MESH_REGION_UNKNOWN' });
+});
+
 test('contacts that come late are told once', async () => withScene(async (scene) => {
   const told = [];
   const listener = (warning) => told.push(warning.code);

@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -92,6 +95,72 @@ TEST(SceneRegistry, RefusesAnotherPoissonRatio) {
   EXPECT_THAT(status.ToString(), HasSubstr("POISSON_RATIO_DIFFERS: "));
   properties.poisson_ratio = 0.3301;  // the tolerance the contract states
   EXPECT_TRUE(stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).ok());
+}
+
+/// SmallModel as a body of two regions, of which the soft one has most of the first mode's energy.
+std::shared_ptr<const ModalModel> ModelOfRegions() {
+  auto model = std::make_shared<ModalModel>(*SmallModel());
+  model->regions = {{.name = "hard",
+                     .poisson_ratio = 0.33,
+                     .strain_energy_parts = {0.25, 0.5, 1},
+                     .kinetic_energy_parts = {0.75, 0.5, 1}},
+                    {.name = "soft",
+                     .relative_young = 0.1,
+                     .relative_density = 0.5,
+                     .poisson_ratio = 0.2,
+                     .strain_energy_parts = {0.75, 0.5, 0},
+                     .kinetic_energy_parts = {0.25, 0.5, 0}}};
+  model->given_triangle_regions = {0, 0, 1, 1};
+  model->mass_kg = 2e-4;
+  return model;
+}
+
+/// Materials that fit ModelOfRegions.
+ObjectProperties PropertiesOfRegions() {
+  ObjectProperties properties;
+  properties.material.regions = {{.region = "",
+                                  .young_pa = kTestYoungPa / 10,
+                                  .density_kg_per_m3 = kTestDensityKgPerM3 / 2,
+                                  .poisson_ratio = std::nullopt,
+                                  .damping = {.alpha2_per_s = 8, .loss_factor = {{1000, 0.01}}}},
+                                 {.region = "HARD",
+                                  .young_pa = kTestYoungPa,
+                                  .density_kg_per_m3 = kTestDensityKgPerM3,
+                                  .poisson_ratio = 0.33}};
+  return properties;
+}
+
+TEST(SceneRegistry, RegionsDampAModeByTheirPartsOfItsEnergies) {
+  Stage stage;
+  const auto placed =
+      stage.scenes.AddObject(stage.scene, 0, ModelOfRegions(), PropertiesOfRegions());
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  EXPECT_NEAR(placed->object.lowest_frequency_hz, 440, 1e-9);
+  const double omega = 2 * std::numbers::pi * 440;
+  EXPECT_NEAR(placed->object.yielding->modes[0].decay_rate_per_s,
+              -(0.75 * 0.01 * omega + 0.25 * 8) / 2, 1e-4);
+  EXPECT_EQ(placed->object.yielding->modes[2].decay_rate_per_s, 0);
+  EXPECT_EQ(placed->object.properties.material.regions[1].region, "soft");
+}
+
+TEST(SceneRegistry, RegionsAreScaledByCommonFactorsOnly) {
+  Stage stage;
+  ObjectProperties properties = PropertiesOfRegions();
+  for (RegionMaterial& region : properties.material.regions) region.young_pa *= 4;
+  const auto placed = stage.scenes.AddObject(stage.scene, 0, ModelOfRegions(), properties);
+  ASSERT_TRUE(placed.ok()) << placed.status();
+  EXPECT_NEAR(placed->object.lowest_frequency_hz, 880, 1e-6);
+  const auto refusal = [&](const std::shared_ptr<const ModalModel>& model,
+                           const ObjectProperties& refused) {
+    return stage.scenes.AddObject(stage.scene, 0, model, refused).status().ToString();
+  };
+  properties.material.regions[0].young_pa *= 1.01;
+  EXPECT_THAT(refusal(ModelOfRegions(), properties), HasSubstr("REGION_MATERIAL_DIFFERS: "));
+  properties = PropertiesOfRegions();
+  properties.material.regions[0].poisson_ratio = 0.21;
+  EXPECT_THAT(refusal(ModelOfRegions(), properties), HasSubstr("REGION_MATERIAL_DIFFERS: "));
+  EXPECT_THAT(refusal(SmallModel(), properties), HasSubstr("REGION_MATERIAL_DIFFERS: "));
+  EXPECT_THAT(refusal(ModelOfRegions(), SmallProperties()), HasSubstr("REGION_MATERIAL_DIFFERS: "));
 }
 
 TEST(SceneRegistry, RefusesSizesAndGainsOutOfRange) {

@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal, Optional, Protocol, Union
 
 import numpy
 
 from carillon import checks, errors
 from carillon.connection import Connection
-from carillon.v1 import material_pb2, modal_model_service_pb2, radiation_pb2
+from carillon.v1 import material_pb2, modal_model_pb2, modal_model_service_pb2, radiation_pb2
 
-Material = Union[str, material_pb2.Material]
+Material = Union[str, material_pb2.Material, Mapping[str, Union[str, material_pb2.Material]]]
+"""A name of the catalogue, a message, or a table from the regions of the mesh file to the material of each. The key ""
+stands for all regions that the table does not name."""
 Radiation = Literal["paper_coupling", "radiated_power", "modes_only"]
 
 
@@ -44,6 +46,10 @@ def material(preset: str = "", *, loss_factor: float | dict[float, float] | None
 def to_message(given: Material) -> material_pb2.Material:
     if isinstance(given, material_pb2.Material):
         return given
+    if isinstance(given, Mapping):
+        return material_pb2.Material(regions=[
+            material_pb2.RegionMaterial(region=region, material=to_message(of_region))
+            for region, of_region in given.items()])
     if not isinstance(given, str):
         raise TypeError(f"material is of type {type(given).__name__}; it must be a name such as \"oak\", or "
                         "carillon.material(...)")
@@ -77,15 +83,20 @@ async def resolve(connection: Connection, given: Material) -> material_pb2.Mater
     """Replaces the name of a material by its figures."""
     message = to_message(given)
     known = await catalogue(connection)
-    if message.preset and message.preset not in known:
-        raise errors.CarillonError("UNKNOWN_MATERIAL", f"there is no material \"{message.preset}\"; "
-                                   + (checks.suggestion(message.preset, known)
-                                      or "Client.materials has all of them"))
+    for preset in [message.preset, *(entry.material.preset for entry in message.regions)]:
+        if preset and preset not in known:
+            raise errors.CarillonError("UNKNOWN_MATERIAL", f"there is no material \"{preset}\"; "
+                                       + (checks.suggestion(preset, known) or "Client.materials has all of them"))
     return resolved(message, known)
 
 
 def resolved(given: material_pb2.Material, known: dict[str, material_pb2.Material]) -> material_pb2.Material:
-    """Replaces the name of a material by the figures of the catalogue, which the given figures override."""
+    """Replaces the names of a material and of those of its regions by the figures of the catalogue, which the given
+    figures override."""
+    if given.regions:
+        return material_pb2.Material(regions=[
+            material_pb2.RegionMaterial(region=entry.region, material=resolved(entry.material, known))
+            for entry in given.regions])
     if not given.preset:
         return given
     made = material_pb2.Material()
@@ -94,6 +105,29 @@ def resolved(given: material_pb2.Material, known: dict[str, material_pb2.Materia
         del made.loss_factor[:]
     made.MergeFrom(given)
     made.preset = ""
+    return made
+
+
+def matched(given: material_pb2.Material, regions: Sequence[modal_model_pb2.ModalModelRegion],
+            known: dict[str, material_pb2.Material]) -> material_pb2.Material:
+    """Returns a resolved material with one entry for each region of a model, in the model's order, and with the model's
+    reference as its figures."""
+    if bool(regions) != bool(given.regions):
+        raise errors.CarillonError("REGION_MATERIAL_DIFFERS", "either the model has several materials and one is "
+                                   "given, or the reverse")
+    if not regions:
+        return given
+    of_region = {entry.region.lower(): entry.material for entry in given.regions}
+    made = material_pb2.Material()
+    for region in regions:
+        name = region.properties.region.lower()
+        found = of_region.get(name) or of_region.get("") or known.get(name)
+        if found is None:
+            raise errors.CarillonError("REGION_MATERIAL_DIFFERS", f"the region \"{name}\" of the model has no material")
+        made.regions.add(region=name, material=found)
+    first = regions[0].properties
+    made.young_pa = made.regions[0].material.young_pa / first.relative_young
+    made.density_kg_per_m3 = made.regions[0].material.density_kg_per_m3 / first.relative_density
     return made
 
 
@@ -106,12 +140,19 @@ def loss_factor_at(given: material_pb2.Material, frequency_hz: numpy.ndarray) ->
 
 
 def modes_of(eigenvalues: numpy.ndarray, given: material_pb2.Material,
-             size: float) -> tuple[numpy.ndarray, numpy.ndarray]:
+             size: float, regions: Sequence[modal_model_pb2.ModalModelRegion] = ()
+             ) -> tuple[numpy.ndarray, numpy.ndarray]:
     """Returns the damped frequencies, Hz, and the decay rates, 1/s, of a body of this material and size relative to
-    the model, by the material alone. An overdamped mode has frequency zero. See docs/physics.md."""
+    the model, by the material alone. An overdamped mode has frequency zero. In a body of several materials, to whose
+    `regions` the material was matched, each region damps a mode in proportion to its part of the energies. See
+    docs/physics.md."""
     omega = numpy.sqrt(eigenvalues * given.young_pa / given.density_kg_per_m3) / size
-    eta = loss_factor_at(given, omega / (2 * numpy.pi))
-    decay = (given.alpha1_s * omega**2 + given.alpha2_per_s + eta * omega) / 2
+    damping = [(entry.material, numpy.array(region.strain_energy_parts), numpy.array(region.kinetic_energy_parts))
+               for entry, region in zip(given.regions, regions)] or [(given, 1.0, 1.0)]
+    decay = numpy.zeros_like(omega)
+    for of_region, strain, kinetic in damping:
+        eta = loss_factor_at(of_region, omega / (2 * numpy.pi))
+        decay += (strain * (of_region.alpha1_s * omega**2 + eta * omega) + kinetic * of_region.alpha2_per_s) / 2
     return numpy.sqrt(numpy.maximum(0, omega**2 - decay**2)) / (2 * numpy.pi), decay
 
 

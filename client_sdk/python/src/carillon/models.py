@@ -74,7 +74,8 @@ class ModelCalls:
         if message is None:
             raise errors.CarillonError("INVALID_MATERIAL", f"{self.name} was not made with a material here; give one, "
                                        "such as material=\"bell_bronze\"")
-        return await materials.resolve(self.client, message)
+        resolved = await materials.resolve(self.client, message)
+        return materials.matched(resolved, self.summary.header.regions, await materials.catalogue(self.client))
 
     @call
     async def modes(self, material: Optional[materials.Material] = None,
@@ -82,7 +83,7 @@ class ModelCalls:
         """Returns the damped frequencies, Hz, and the decay rates, 1/s, of the modes by the material alone.
         `radiation_decays` has what radiation adds."""
         figures = await self._figures(material)
-        return materials.modes_of(await self._eigenvalues(), figures, size)
+        return materials.modes_of(await self._eigenvalues(), figures, size, self.summary.header.regions)
 
     @call
     async def frequencies(self, material: Optional[materials.Material] = None, size: float = 1) -> numpy.ndarray:

@@ -34,13 +34,21 @@ void ElementFile::AddTriangles(std::span<const std::string> names,
   }
 }
 
-absl::Status ElementFile::AddTetrahedron(std::span<const int64_t> nodes_of_one) {
+absl::Status ElementFile::AddTetrahedron(std::span<const int64_t> nodes_of_one,
+                                         const MeshRegion& region) {
   const auto count = static_cast<int>(nodes_of_one.size());
   if (nodes_per_element != 0 && nodes_per_element != count) {
     return UnsupportedElements("tetrahedra of 4 and of 10 nodes");
   }
   nodes_per_element = count;
   elements.insert(elements.end(), nodes_of_one.begin(), nodes_of_one.end());
+  // Neighbours in the file mostly have the same region.
+  const bool is_last =
+      !element_regions.empty() && regions[static_cast<size_t>(element_regions.back())] == region;
+  const auto found =
+      is_last ? regions.begin() + element_regions.back() : std::ranges::find(regions, region);
+  element_regions.push_back(static_cast<int32_t>(found - regions.begin()));
+  if (found == regions.end()) regions.push_back(region);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "precompute/mesh/mesh_names.h"
 #include "precompute/mesh/surface_mesh.h"
 
 namespace carillon::precompute {
@@ -34,7 +35,9 @@ struct ElementFile {
   std::vector<std::array<int64_t, 3>>
       triangles;  ///< triangles of surfaces that bound or divide the body
   std::vector<Group> groups;
-  std::vector<std::string> warnings;  ///< what the reader left out, for the user
+  std::vector<MeshRegion> regions;       ///< each once
+  std::vector<int32_t> element_regions;  ///< the region of each tetrahedron
+  std::vector<std::string> warnings;     ///< what the reader left out, for the user
 
   /// Returns the group of that name, new if there was none.
   Group& Named(const std::string& name);
@@ -44,7 +47,7 @@ struct ElementFile {
   void AddTriangles(std::span<const std::string> names,
                     std::span<const std::array<int64_t, 3>> pieces);
   /// Adds a tetrahedron of 4 or 10 nodes. Errors: MESH_ELEMENT_UNSUPPORTED (a file has both kinds).
-  absl::Status AddTetrahedron(std::span<const int64_t> nodes_of_one);
+  absl::Status AddTetrahedron(std::span<const int64_t> nodes_of_one, const MeshRegion& region = {});
 };
 
 /// Checks the number of nodes of a file. Errors: MESH_TOO_LARGE if it exceeds the limit.

@@ -49,13 +49,17 @@ absl::Status UnknownGmshKind(int type) {
 absl::Status GmshElements::Add(const GmshKind& kind, std::span<const int32_t> physicals,
                                std::span<const int64_t> nodes) {
   std::vector<std::string> groups;
+  MeshRegion region;
   for (const int32_t physical : physicals) {
     const int32_t number = std::abs(physical);  // a sign is a direction
     const auto name = physical_names.find({kind.dimension, number});
     if (name != physical_names.end()) {
       groups.push_back(name->second);
+      if (region.name.empty()) region.name = name->second;
     } else if (number != 0 && kind.dimension < 3) {
       groups.push_back(absl::StrCat(number));
+    } else if (number != 0 && region.name.empty()) {
+      region.name = absl::StrCat(number);
     }
   }
   file.AddToGroups(groups, nodes.first(kind.corner_count));
@@ -70,7 +74,7 @@ absl::Status GmshElements::Add(const GmshKind& kind, std::span<const int32_t> ph
   std::vector<int64_t> tetrahedron(nodes.begin(), nodes.end());
   // Gmsh puts the last two mid-side nodes on the edges 2-3 and 1-3.
   if (kind.type == kTetrahedron10) std::swap(tetrahedron[8], tetrahedron[9]);
-  return file.AddTetrahedron(tetrahedron);
+  return file.AddTetrahedron(tetrahedron, region);
 }
 
 }  // namespace carillon::precompute

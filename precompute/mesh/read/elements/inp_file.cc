@@ -150,7 +150,7 @@ class InpParser {
 
   absl::Status TakeSection() {
     if (keyword_.Has("COMPOSITE")) return NotRead("*SOLID SECTION, COMPOSITE");
-    scope_->materials.insert(InpName(keyword_.Of("MATERIAL")));
+    scope_->sections.push_back({keyword_.Of("ELSET"), keyword_.Of("MATERIAL")});
     return absl::OkStatus();
   }
 

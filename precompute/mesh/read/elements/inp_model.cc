@@ -2,8 +2,8 @@
 #include "precompute/mesh/read/elements/inp_model.h"
 
 #include <algorithm>
-#include <iterator>
 #include <map>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -63,8 +63,9 @@ class BodyJoiner {
       file_.nodes.push_back(body.motion.Apply(body.scope.points[n]));
     }
     std::vector<Placed>& placed = placed_.emplace_back();
-    for (const InpScope::Element& element : body.scope.elements) {
-      ASSIGN_OR_RETURN(Placed one, AddElement(b, element));
+    const std::vector<MeshRegion> sections = body.scope.SectionsOfElements();
+    for (size_t e = 0; e < sections.size(); ++e) {
+      ASSIGN_OR_RETURN(Placed one, AddElement(b, body.scope.elements[e], sections[e]));
       placed.push_back(one);
     }
     for (const InpScope::Set& set : body.scope.sets) {
@@ -82,7 +83,8 @@ class BodyJoiner {
         .subspan(element.first_node, element.kind.node_count);
   }
 
-  absl::StatusOr<Placed> AddElement(size_t b, const InpScope::Element& element) {
+  absl::StatusOr<Placed> AddElement(size_t b, const InpScope::Element& element,
+                                    const MeshRegion& section) {
     std::vector<int64_t> nodes;
     for (const int64_t number : NodesOf(b, element)) {
       if (!bodies_[b].scope.node_at.contains(number)) {
@@ -98,7 +100,7 @@ class BodyJoiner {
     const size_t first = file_.triangles.size();
     if (element.kind.dimension == 2) AddFace(element.kind, nodes);
     if (element.kind.dimension == 3) {
-      RETURN_IF_ERROR(file_.AddTetrahedron(nodes));
+      RETURN_IF_ERROR(file_.AddTetrahedron(nodes, section));
     }
     return Placed{first, file_.triangles.size()};
   }
@@ -153,20 +155,6 @@ class BodyJoiner {
   ElementFile file_;
 };
 
-absl::Status CheckMaterials(const std::vector<InpBody>& bodies) {
-  std::set<std::string> materials;
-  for (const InpBody& body : bodies) {
-    materials.insert(body.scope.materials.begin(), body.scope.materials.end());
-  }
-  if (materials.size() < 2) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInvalidArgument, "MESH_ELEMENT_UNSUPPORTED",
-                 absl::StrCat("the file has sections of ", materials.size(), " materials, ",
-                              QuotedText(*materials.begin()), " and ",
-                              QuotedText(*std::next(materials.begin())),
-                              " among them, and a body has one material here: export the elements "
-                              "of one material alone, or give all sections the same"));
-}
-
 }  // namespace
 
 InpScope::Set* InpScope::FindSet(const std::string& name) {
@@ -181,13 +169,26 @@ InpScope::Set& InpScope::SetNamed(const std::string& name) {
                           : sets.emplace_back(Set{.name = name, .nodes = {}, .elements = {}});
 }
 
+std::vector<MeshRegion> InpScope::SectionsOfElements() const {
+  std::vector<MeshRegion> of_elements(elements.size());
+  for (const MeshRegion& section : sections) {
+    const auto set = std::ranges::find_if(
+        sets, [&](const Set& named) { return absl::EqualsIgnoreCase(named.name, section.name); });
+    if (set == sets.end()) continue;
+    for (const int64_t number : set->elements) {
+      const auto element = element_at.find(number);
+      if (element != element_at.end()) of_elements[element->second] = section;
+    }
+  }
+  return of_elements;
+}
+
 absl::StatusOr<ElementFile> JoinBodies(std::vector<InpBody> bodies,
                                        const std::vector<InpAssemblySet>& sets) {
   // Bodies without elements are reference points.
   if (bodies.size() > 1) {
     std::erase_if(bodies, [](const InpBody& body) { return body.scope.elements.empty(); });
   }
-  RETURN_IF_ERROR(CheckMaterials(bodies));
   return BodyJoiner(bodies).Join(sets);
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -38,7 +37,10 @@ struct InpScope {
   std::vector<int64_t> element_nodes;
   absl::flat_hash_map<int64_t, size_t> element_at;  ///< index by number
   std::vector<Set> sets;
-  std::set<std::string> materials;  ///< of its solid sections, in capitals
+  std::vector<MeshRegion> sections;  ///< the sets and materials of its solid sections
+
+  /// Returns for each element the section that its set has, or an empty one.
+  std::vector<MeshRegion> SectionsOfElements() const;
 
   /// Returns the set of that name, without regard to the case of letters, or null.
   Set* FindSet(const std::string& name);
@@ -65,7 +67,7 @@ struct InpAssemblySet {
 /// apart. The nodes of a single body, or of the only one with tetrahedra, keep their numbers. A set
 /// that several bodies have is named "INSTANCE.SET".
 ///
-/// Errors: MESH_INDEX_OUT_OF_RANGE, MESH_ELEMENT_UNSUPPORTED (sections of several materials).
+/// Errors: MESH_INDEX_OUT_OF_RANGE, MESH_ELEMENT_UNSUPPORTED.
 absl::StatusOr<ElementFile> JoinBodies(std::vector<InpBody> bodies,
                                        const std::vector<InpAssemblySet>& sets);
 

@@ -122,7 +122,7 @@ class MeditParser {
                                        " (nodes, then the reference)"));
       }
       if (kind.dimension == 3) {
-        RETURN_IF_ERROR(file_.AddTetrahedron(nodes));
+        RETURN_IF_ERROR(file_.AddTetrahedron(nodes, {absl::StrCat(reference)}));
         continue;
       }
       AddTo(kind.dimension, reference, std::span(nodes).first(kind.corner_count));

@@ -108,7 +108,10 @@ class TetgenParser {
     if (node_count == 10) {
       for (const size_t k : kMidsides) nodes.push_back(figures[1 + k]);
     }
-    return file_.AddTetrahedron(nodes);
+    const auto attribute = static_cast<size_t>(node_count) + 1;
+    const std::string region =
+        figures.size() > attribute ? absl::StrCat(figures[attribute]) : std::string();
+    return file_.AddTetrahedron(nodes, {region});
   }
 
   TextLines lines_;

@@ -39,6 +39,17 @@ TEST_F(ReadGmshTest, GivesTheMeshThatWasWritten) {
   }
 }
 
+TEST_F(ReadGmshTest, PhysicalGroupsOfVolumesAreRegions) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      Header() + "$PhysicalNames\n2\n3 7 \"the head\"\n2 8 \"wall\"\n$EndPhysicalNames\n" +
+          "$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n$EndNodes\n"
+          "$Elements\n3\n1 2 2 8 1 2 3 4\n2 4 2 7 1 1 2 3 4\n3 4 2 9 2 2 3 4 5\n$EndElements\n",
+      "msh");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->names.regions, (std::vector<MeshRegion>{{"the head"}, {"9"}}));
+  EXPECT_EQ(std::get<TetMesh>(read->mesh).regions, (std::vector<int32_t>{0, 1}));
+}
+
 TEST_F(ReadGmshTest, LengthsAreInMetres) {
   const absl::StatusOr<Mesh> read = Read(ToTextGmsh(Box(4)), "msh", 0.5);
   ASSERT_TRUE(read.ok());

@@ -140,14 +140,25 @@ TEST_F(ReadInpTest, WhatIsNotReadIsRefusedByName) {
       {flat + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n", "line 9: element 1 is there twice"},
       {flat + "*ELEMENT, TYPE=B31\n2, 1,2\n",
        "MESH_ELEMENT_UNSUPPORTED: the file has elements of type B31 (line 8)"},
-      {flat + "*SOLID SECTION, ELSET=a, MATERIAL=steel\n*SOLID SECTION, ELSET=b, MATERIAL=ash\n",
-       "MESH_ELEMENT_UNSUPPORTED: the file has sections of 2 materials, \"ASH\" and \"STEEL\""},
       {"*INSTANCE, NAME=a, PART=none\n", "an instance of the part \"none\", which is not there"},
       {flat + "*SYSTEM\n0,0,0, 1,0,0\n2,0,0\n", "no points of *SYSTEM, or they lie on one line"},
   };
   for (const auto& [file, message] : cases) {
     EXPECT_THAT(Refused(file, "inp"), HasSubstr(message)) << file;
   }
+}
+
+TEST_F(ReadInpTest, SectionsDivideTheBodyIntoRegions) {
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed(std::string("*SOLID SECTION, ELSET=handle, MATERIAL=Ash\n") + kNodes +
+                    "5, 1,1,1\n*ELEMENT, TYPE=C3D4, ELSET=head\n7, 2,3,4,5\n"
+                    "*ELEMENT, TYPE=C3D4, ELSET=Handle\n1, 1,2,3,4\n"
+                    "*SOLID SECTION, ELSET=HEAD, MATERIAL=Steel\n",
+                "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->names.regions,
+              ElementsAre(MeshRegion{"HEAD", "Steel"}, MeshRegion{"handle", "Ash"}));
+  EXPECT_THAT(std::get<TetMesh>(read->mesh).regions, ElementsAre(0, 1));
 }
 
 TEST_F(ReadInpTest, ANodeThatIsThereTwiceAtOnePlaceIsOneNode) {

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mallet of two materials from a file with sections, through the daemon to sound: pitch and decay of each partial,
+scaling by common factors, and clear refusals."""
+
+import json
+import math
+import unittest
+
+import meshes
+import numpy
+import sound
+from daemon import DaemonTest
+
+import carillon
+
+LENGTH = meshes.BAR_SIZE[0]
+CELLS = (10, 2, 1)
+JOINT = 0.6 * LENGTH
+BRASS_ETA, OAK_ETA = 0.0005, 0.01  # of the catalogue
+
+
+def sections():
+    """The bar of the other tests, its first three fifths in the section BRASS and the rest in GRIP, of MY-OAK."""
+    nodes, tetrahedra = meshes.tetrahedra_of_bar(*CELLS)
+    lines = ["*NODE"] + [f"{n + 1}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(nodes)]
+    for name, wanted in (("brass", True), ("grip", False)):
+        lines.append(f"*ELEMENT, TYPE=C3D4, ELSET={name}")
+        lines += [f"{e + 1}, " + ", ".join(str(n + 1) for n in tetrahedron) for e, tetrahedron in enumerate(tetrahedra)
+                  if (sum(nodes[n][0] for n in tetrahedron) / 4 < JOINT) == wanted]
+    lines += ["*SOLID SECTION, ELSET=BRASS, MATERIAL=CuZn", "*SOLID SECTION, ELSET=GRIP, MATERIAL=My-Oak"]
+    return "\n".join(lines) + "\n"
+
+
+class RegionsTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.mallet = cls.folder / "mallet.inp"
+        cls.mallet.write_text(sections())
+
+    def create(self, *materials, check=True):
+        options = [part for text in materials for part in ("--material", text)]
+        return self.daemon.command("model", "create", self.mallet, *options, "--band", "20:8000", "--wait", check=check)
+
+    def modes(self, model, *options):
+        shown = json.loads(self.daemon.command("--json", "model", "show", model, *options).stdout)
+        return shown["frequencies_hz"], shown["t60_s"], shown["header"]
+
+    def refusal(self, *arguments):
+        printed = self.daemon.command(*arguments, check=False)
+        self.assertNotEqual(printed.returncode, 0)
+        return printed.stderr
+
+    def test_each_partial_has_its_pitch_and_the_decay_of_its_strain_energy(self):
+        model = self.create("brass=brass", "my-oak=oak").stdout.strip()
+        frequencies_hz, t60_s, header = self.modes(model)
+        regions = {region["properties"]["region"]: region for region in header["regions"]}
+        self.assertEqual(set(regions), {"brass", "my-oak"})
+        for k, hz in enumerate(frequencies_hz):
+            strain = [regions[name]["strain_energy_parts"][k] for name in ("brass", "my-oak")]
+            self.assertAlmostEqual(sum(strain), 1, places=6)
+            eta = strain[0] * BRASS_ETA + strain[1] * OAK_ETA
+            self.assertAlmostEqual(t60_s[k] * eta * math.pi * hz, math.log(1000), delta=1e-4)
+        out = self.folder / "struck.wav"
+        self.daemon.command("strike", model, "--out", out, "--point", f"0,0.003,{meshes.BAR_SIZE[2]}", "--impulse",
+                            "0.002,-0.003,-0.005", "--duration", 0, "--seconds", 2)
+        samples = sound.read_wave(out)[:, 0]
+        heard = 0
+        for k, hz in enumerate(frequencies_hz[:4]):
+            rate = math.log(1000) / t60_s[k]
+            partial = sound.measure(samples, hz, 0.06, min(0.06 + 4 / rate, 1.5), 0.01)
+            damped_hz = math.sqrt(hz**2 - (rate / (2 * math.pi))**2)
+            self.assertAlmostEqual(partial.frequency_hz / damped_hz, 1, delta=1e-5)
+            self.assertAlmostEqual(partial.decay_per_s / -rate, 1, delta=0.01)
+            heard += 1
+        self.assertEqual(heard, 4)
+        # Neither of the two materials alone decays like that.
+        alone = [math.log(1000) / (eta * math.pi * frequencies_hz[0]) for eta in (OAK_ETA, BRASS_ETA)]
+        self.assertTrue(1.2 * alone[0] < t60_s[0] < alone[1] / 1.2)
+
+    def test_a_stored_model_serves_common_factors_only(self):
+        model = self.create("brass=brass", "grip=oak").stdout.strip()
+        before, _, _ = self.modes(model)
+        with carillon.Client(self.daemon.server) as client:
+            def scaled(brass, oak):
+                of = {"brass": carillon.material("brass", young_pa=brass * 100.6e9),
+                      "grip": carillon.material("oak", young_pa=oak * 12.3e9)}
+                with client.scene() as scene:
+                    told = scene.add(model, of).message
+                    # A material that the daemon told may be given back.
+                    self.assertEqual(scene.add(model, told.material).message.lowest_frequency_hz,
+                                     told.lowest_frequency_hz)
+                    return told.lowest_frequency_hz
+
+            self.assertAlmostEqual(scaled(4, 4) / scaled(1, 1), 2, places=6)
+            with self.assertRaises(carillon.CarillonError) as refused:
+                scaled(1, 1.1)
+            self.assertEqual(refused.exception.reason, "REGION_MATERIAL_DIFFERS")
+            shown, decays = client.model(model).modes({"BRASS": "brass", "grip": "oak"})
+            numpy.testing.assert_allclose(numpy.sqrt((2 * numpy.pi * shown)**2 + decays**2) / (2 * numpy.pi), before,
+                                          rtol=1e-9)
+
+    def test_materials_and_regions_must_match(self):
+        create = ("model", "create", self.mallet, "--band", "20:8000", "--wait", "--material")
+        self.assertRegex(self.refusal(*create, "brass=brass"), r"MESH_REGION_UNKNOWN.*\"grip\"|\"GRIP\"")
+        self.assertIn("\"head\"", self.refusal(*create, "brass=brass", "--material", "grip=oak", "--material",
+                                               "head=lead"))
+        self.assertIn("MESH_ELEMENT_UNSUPPORTED", self.refusal(*create, "oak"))
+        self.assertIn("UNKNOWN_MATERIAL", self.refusal(*create, "brass=bras", "--material", "grip=oak"))
+        model = self.create("brass=brass", "grip=oak").stdout.strip()
+        self.assertIn("REGION_MATERIAL_DIFFERS", self.refusal("strike", model, "--material", "oak", "--point",
+                                                              "0,0,0", "--impulse", "0,0,-1"))
+
+    def test_other_regions_have_the_material_without_a_name(self):
+        both = self.modes(self.create("brass=brass", "grip=oak").stdout.strip())
+        rest = self.modes(self.create("oak", "brass=brass").stdout.strip())
+        numpy.testing.assert_allclose(rest[0], both[0], rtol=1e-9)
+
+
+if __name__ == "__main__":
+    unittest.main()
