@@ -1,20 +1,24 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""How fast sound comes in step: environments that are performed together, each with one impact a step and the poses of
-all its bodies, by the package for Python over a Unix socket. The CPU of the daemon and of this client is told apart.
+"""How fast sound comes in step: environments that are performed together, over a Unix socket.
+
+In each step every body of every environment has a pose, and one of them is struck. The CPU is told apart into that of
+the daemon and that of the client.
 """
 
 import argparse
+import json
 import os
 import pathlib
+import subprocess
 import sys
 import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 CASES = ((1, 5, 60, 0.02), (64, 5, 60, 0.02), (1024, 1, 20, 0.002))  # environments, bodies, modes of each, step, s
-COLUMNS = ("environments", "bodies", "modes", "step, ms", "times real time", "a step, us", "an environment's step, us",
-           "daemon's CPU", "client's CPU")
+COLUMNS = ("client", "environments", "bodies", "modes", "step, ms", "times real time", "a step, us",
+           "an environment's step, us of CPU", "of that the client's")
 
 
 def cpu_s(pid):
@@ -22,35 +26,64 @@ def cpu_s(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def measure(carillon, numpy, client, daemon, model, case, seconds):
+class Python:
+    """The package for Python, in this process."""
+
+    def __init__(self, client):
+        self.client = client
+
+    def run(self, model, case, seconds):
+        import carillon
+        import numpy
+        environments, bodies, _, step = case
+        every = numpy.repeat(numpy.arange(environments), bodies)
+        handles = numpy.tile(numpy.arange(1, bodies + 1), environments)
+        own = numpy.arange(environments)
+        with self.client.perform(step=step, environments=environments,
+                                 microphones=[carillon.Omni(at=(0, 0, 1.5))]) as sound:
+            for handle in range(1, bodies + 1):
+                sound.add(model, handle=handle)
+
+            def perform(k):
+                positions = numpy.column_stack([0.1 * handles, 0 * handles, 1e-4 * k + 0 * handles])
+                blows = carillon.Impacts(1 + (own + k) % bodies, numpy.tile([0, 0.008, 0.01], (environments, 1)),
+                                         numpy.tile([0, 0, -0.002], (environments, 1)), durations=1e-4,
+                                         environments=own)
+                return sound.step(impacts=blows, poses=carillon.Poses(handles, positions, environments=every))[0]
+
+            for k in range(20):
+                perform(k)
+            begun, cpu_before, count, loudest = time.perf_counter(), time.process_time(), 0, 0.0
+            while time.perf_counter() - begun < seconds:
+                loudest = max(loudest, perform(20 + count).max())
+                count += 1
+            return {"steps": count, "seconds": time.perf_counter() - begun,
+                    "cpu_s": time.process_time() - cpu_before, "loudest": loudest}
+
+
+class Cpp:
+    """The client for C++, in a process of its own."""
+
+    def __init__(self, program, server):
+        self.program, self.server = program, server
+
+    def run(self, model, case, seconds):
+        environments, bodies, _, step = case
+        words = [self.program, self.server, model.name, *map(str, (environments, bodies, step, seconds))]
+        return json.loads(subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout)
+
+
+def measure(daemon, language, client, model, case, seconds):
+    before = cpu_s(daemon.process.pid)
+    found = client.run(model, case, seconds)
+    assert found["loudest"] > 0, "nothing was heard"
     environments, bodies, modes, step = case
-    every = numpy.repeat(numpy.arange(environments), bodies)
-    handles = numpy.tile(numpy.arange(1, bodies + 1), environments)
-    own = numpy.arange(environments)
-    with client.perform(step=step, environments=environments, microphones=[carillon.Omni(at=(0, 0, 1.5))]) as sound:
-        for handle in range(1, bodies + 1):
-            sound.add(model, handle=handle)
-
-        def perform(k):
-            poses = carillon.Poses(handles, numpy.column_stack([0.1 * handles, 0 * handles, 1e-4 * k + 0 * handles]),
-                                   environments=every)
-            blows = carillon.Impacts(1 + (own + k) % bodies, numpy.tile([0, 0.008, 0.01], (environments, 1)),
-                                     numpy.tile([0, 0, -0.002], (environments, 1)), durations=1e-4, environments=own)
-            return sound.step(impacts=blows, poses=poses)[0]
-
-        for k in range(20):
-            perform(k)
-        pids = (daemon.process.pid, os.getpid())
-        begun, before = time.perf_counter(), [cpu_s(pid) for pid in pids]
-        count, loudest = 0, 0.0
-        while time.perf_counter() - begun < seconds:
-            loudest = max(loudest, perform(20 + count)[0].max())
-            count += 1
-        wall, used = time.perf_counter() - begun, [cpu_s(pid) - was for pid, was in zip(pids, before)]
-    if loudest <= 0:
-        raise SystemExit("nothing was heard")
-    cells = (environments, bodies, modes, 1000 * step, f"{count * step / wall:.2f}", f"{1e6 * wall / count:.0f}",
-             f"{1e6 * wall / count / environments:.1f}", *(f"{share / wall:.2f}" for share in used))
+    each = 1e6 / found["steps"] / environments  # from seconds in all to us of each environment and step
+    # The daemon's share contains 20 steps more, in which it makes what the environments need.
+    daemon_share = (cpu_s(daemon.process.pid) - before) * each * found["steps"] / (found["steps"] + 20)
+    cells = (language, environments, bodies, modes, 1000 * step, f"{found['steps'] * step / found['seconds']:.2f}",
+             f"{1e6 * found['seconds'] / found['steps']:.0f}", f"{daemon_share + found['cpu_s'] * each:.1f}",
+             f"{found['cpu_s'] * each:.1f}")
     print(f"| {' | '.join(map(str, cells))} |", flush=True)
 
 
@@ -65,19 +98,20 @@ def main():
                     str(ROOT / "tests/integration")]
     os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
     # They need the paths above.
-    import numpy
     import carillon
     import meshes
     from daemon import Daemon
     with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
         daemon = Daemon(folder)
         try:
-            with carillon.connect(daemon.server) as client:
+            with carillon.connect(daemon.server) as connection:
+                clients = {"Python": Python(connection), "C++": Cpp(build / "tests/lockstep", daemon.server)}
                 print(f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}")
                 for case in (CASES[i] for i in options.cases):
-                    model = client.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL, settings={"keep_mode_count": case[2]},
-                                                without_transfer=True)
-                    measure(carillon, numpy, client, daemon, model, case, options.seconds)
+                    model = connection.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL,
+                                                    settings={"keep_mode_count": case[2]}, without_transfer=True)
+                    for language, client in clients.items():
+                        measure(daemon, language, client, model, case, options.seconds)
         finally:
             daemon.stop()
 
