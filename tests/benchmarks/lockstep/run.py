@@ -33,32 +33,18 @@ class Python:
         self.client = client
 
     def run(self, model, case, seconds):
-        import carillon
-        import numpy
-        environments, bodies, _, step = case
-        every = numpy.repeat(numpy.arange(environments), bodies)
-        handles = numpy.tile(numpy.arange(1, bodies + 1), environments)
-        own = numpy.arange(environments)
-        with self.client.perform(step=step, environments=environments,
-                                 microphones=[carillon.Omni(at=(0, 0, 1.5))]) as sound:
-            for handle in range(1, bodies + 1):
-                sound.add(model, handle=handle)
-
-            def perform(k):
-                positions = numpy.column_stack([0.1 * handles, 0 * handles, 1e-4 * k + 0 * handles])
-                blows = carillon.Impacts(1 + (own + k) % bodies, numpy.tile([0, 0.008, 0.01], (environments, 1)),
-                                         numpy.tile([0, 0, -0.002], (environments, 1)), durations=1e-4,
-                                         environments=own)
-                return sound.step(impacts=blows, poses=carillon.Poses(handles, positions, environments=every))[0]
-
-            for k in range(20):
-                perform(k)
-            begun, cpu_before, count, loudest = time.perf_counter(), time.process_time(), 0, 0.0
+        from performed import STEPS_BEFORE, Performed
+        environments, bodies, _, step_s = case
+        performed = Performed(self.client, model, environments, bodies, step_s)
+        with performed.sound:
+            for number in range(STEPS_BEFORE):
+                performed.step(number)
+            begun, cpu_before_s, count, loudest = time.perf_counter(), time.process_time(), 0, 0.0
             while time.perf_counter() - begun < seconds:
-                loudest = max(loudest, perform(20 + count).max())
+                loudest = max(loudest, performed.step(STEPS_BEFORE + count).max())
                 count += 1
             return {"steps": count, "seconds": time.perf_counter() - begun,
-                    "cpu_s": time.process_time() - cpu_before, "loudest": loudest}
+                    "cpu_s": time.process_time() - cpu_before_s, "loudest": loudest}
 
 
 class Cpp:
@@ -68,8 +54,8 @@ class Cpp:
         self.program, self.server = program, server
 
     def run(self, model, case, seconds):
-        environments, bodies, _, step = case
-        words = [self.program, self.server, model.name, *map(str, (environments, bodies, step, seconds))]
+        environments, bodies, _, step_s = case
+        words = [self.program, self.server, model.name, *map(str, (environments, bodies, step_s, seconds)), os.devnull]
         return json.loads(subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout)
 
 
@@ -95,7 +81,7 @@ def main():
     options = parser.parse_args()
     build = options.build.resolve()
     sys.path[:0] = [str(build / "client_sdk/python"), str(ROOT / "client_sdk/python"),
-                    str(ROOT / "tests/integration")]
+                    str(ROOT / "tests/integration"), str(ROOT / "tests/integration/clients")]
     os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
     # They need the paths above.
     import carillon
@@ -105,7 +91,7 @@ def main():
         daemon = Daemon(folder)
         try:
             with carillon.connect(daemon.server) as connection:
-                clients = {"Python": Python(connection), "C++": Cpp(build / "tests/lockstep", daemon.server)}
+                clients = {"Python": Python(connection), "C++": Cpp(build / "tests/performed", daemon.server)}
                 print(f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}")
                 for case in (CASES[i] for i in options.cases):
                     model = connection.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL,

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Performs environments for some seconds, and prints the number of steps and the time they took.
-// Usage: lockstep SERVER MODEL ENVIRONMENTS BODIES STEP_S SECONDS
+// Performs environments for some seconds, prints the number of steps and the time they took, and
+// writes the samples of the first steps to a file.
+// Usage: performed SERVER MODEL ENVIRONMENTS BODIES STEP_S SECONDS FILE
 // In each step every body of every environment has a pose, and one of them is struck.
 
 #include <carillon/client.h>
@@ -10,15 +11,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <iostream>
-#include <memory>
+#include <span>
 #include <string>
 
 namespace {
 
 using carillon::client::Performance;
+using carillon::client::PerformedStep;
 using std::chrono::steady_clock;
 
+/// Steps whose samples are written, before those whose time is measured.
 constexpr uint64_t kStepsBefore = 20;
 
 struct Case {
@@ -77,33 +81,39 @@ void AddBlows(const Case& own, uint64_t number, carillon::v1::PerformedContacts&
   }
 }
 
-/// Performs one step, and returns the largest sample.
-absl::StatusOr<float> Perform(const Case& own, uint64_t number, Performance& performance) {
+/// Performs one step.
+absl::StatusOr<PerformedStep> Perform(const Case& own, uint64_t number, Performance& performance) {
   carillon::v1::PerformStep step;
   AddPoses(own, number, *step.mutable_poses());
   AddBlows(own, number, *step.add_contacts());
-  const auto heard = performance.Step(step);
-  if (!heard.ok()) return heard.status();
-  return *std::ranges::max_element(heard->samples);
+  return performance.Step(step);
 }
 
-absl::Status Run(const Case& own, double seconds, Performance& performance) {
+absl::Status WriteFirstSteps(const Case& own, const char* file, Performance& performance) {
+  std::ofstream samples(file, std::ios::binary);
+  for (uint64_t number = 0; number < kStepsBefore; ++number) {
+    const auto performed = Perform(own, number, performance);
+    if (!performed.ok()) return performed.status();
+    const auto bytes = std::as_bytes(performed->samples);
+    samples.write(reinterpret_cast<const char*>(bytes.data()),
+                  static_cast<std::streamsize>(bytes.size()));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Measure(const Case& own, double seconds, Performance& performance) {
   float loudest = 0;
   uint64_t count = 0;
-  double cpu_before_s = 0;
-  steady_clock::time_point begin;
+  const double cpu_before_s = CpuS();
+  const steady_clock::time_point begin = steady_clock::now();
   std::chrono::duration<double> passed{};
   for (; passed.count() < seconds; ++count) {
-    if (count == kStepsBefore) {
-      begin = steady_clock::now();
-      cpu_before_s = CpuS();
-    }
-    const absl::StatusOr<float> peak = Perform(own, count, performance);
-    if (!peak.ok()) return peak.status();
-    loudest = std::max(loudest, *peak);
-    if (count >= kStepsBefore) passed = steady_clock::now() - begin;
+    const auto performed = Perform(own, kStepsBefore + count, performance);
+    if (!performed.ok()) return performed.status();
+    loudest = std::max(loudest, *std::ranges::max_element(performed->samples));
+    passed = steady_clock::now() - begin;
   }
-  std::cout << "{\"steps\": " << count - kStepsBefore << ", \"seconds\": " << passed.count()
+  std::cout << "{\"steps\": " << count << ", \"seconds\": " << passed.count()
             << ", \"cpu_s\": " << CpuS() - cpu_before_s << ", \"loudest\": " << loudest << "}\n";
   return absl::OkStatus();
 }
@@ -111,14 +121,15 @@ absl::Status Run(const Case& own, double seconds, Performance& performance) {
 }  // namespace
 
 int main(int count, char** values) {
-  if (count != 7) return 2;
+  if (count != 8) return 2;
   const Case own{.environment_count = static_cast<uint32_t>(std::atoi(values[3])),
                  .body_count = static_cast<uint32_t>(std::atoi(values[4])),
                  .step_s = std::atof(values[5])};
   const auto client = carillon::client::Connect(values[1]);
   const auto performance = client->Perform(SettingsOf(own, values[2]));
-  const absl::Status status =
-      performance.ok() ? Run(own, std::atof(values[6]), **performance) : performance.status();
+  absl::Status status = performance.status();
+  if (status.ok()) status = WriteFirstSteps(own, values[7], **performance);
+  if (status.ok()) status = Measure(own, std::atof(values[6]), **performance);
   if (!status.ok()) std::cerr << status << '\n';
   return status.ok() ? 0 : 1;
 }
