@@ -1,0 +1,259 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""How well `carillon material fit` finds materials: sounds of bodies whose material is known, the recorded steel bar,
+and recordings held against the mesh of another body.
+
+    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--parts table,wrong,bar]
+
+Prints Markdown tables. A sound is the closed form of a struck body whose frequencies are jittered by 0.15 %, which
+stands for what a mesh misses, decomposed at another Poisson's ratio than that of the model.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy
+
+import bodies
+
+HERE = pathlib.Path(__file__).resolve().parent
+HARD_S, SOFT_S = (40e-6, 120e-6), (2e-4, 6e-4)
+ROWS = {f"{name}{noise}{'room' * room}": (span, noise, room)
+        for name, span in (("hard", HARD_S), ("soft", SOFT_S))
+        for noise, room in ((60, False), (40, False), (20, False), (40, True))}
+STRIKES, JITTER = 2, 0.0015
+# The bar of ../../../../shared/recordings: its size and its mass.
+BAR_SIZE_M, BAR_MASS_KG, BAR_YOUNG_PA = (0.11436, 0.02544, 0.00312), 0.0713, 214.6e9
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What one fit came to; only `refused` is set where there was no answer."""
+
+    refused: str = ""
+    young_error: float = 0.0  # relative, of E/rho
+    nu_error: float = 0.0
+    damping_error: float = 0.0  # median, relative, over the matched lines
+    matched: int = 0
+    log_odds: float = 0.0
+    cpu_s: float = 0.0
+
+
+class Studio:
+    """A daemon with the models of the bodies, and files in a folder."""
+
+    def __init__(self, build, folder):
+        self.bin, self.folder = build / "bin", folder
+        import daemon
+
+        self.daemon = daemon.Daemon(folder)
+
+    def decompose(self, body, material, nu):
+        import meshes
+
+        young, density, _ = bodies.MATERIALS[material]
+        mesh, out = self.folder / f"{body}.obj", self.folder / f"{body}-{material}-{nu:.4f}.model"
+        if not out.exists():
+            mesh.write_bytes(meshes.obj(*bodies.BODIES[body][0]))
+            subprocess.run([self.bin / "carillon-precompute", mesh, "--out", out, "--young", str(young), "--density",
+                            str(density), "--poisson", str(nu), "--band", "20:20000"], check=True, capture_output=True)
+        return out
+
+    def truth(self, body, material, nu):
+        header, arrays = bodies.read_arrays(self.decompose(body, material, nu))
+        return bodies.Truth(body, material, nu, arrays["eigenvalues"], arrays["couplings"],
+                            arrays["shapes"].astype(float), numpy.array(header.estimated_errors))
+
+    def model(self, body, material):
+        """The name of the stored model of a body."""
+        path = self.decompose(body, material, bodies.NU_OF_MODELS)
+        return json.loads(self.daemon.command("--json", "model", "import", path).stdout)["name"]
+
+    def fit(self, model, *arguments):
+        """The JSON of a fit, or None and the refusal."""
+        before = os.times()
+        done = self.daemon.command("--json", "material", "fit", model.split("/")[-1], *arguments, check=False)
+        after = os.times()
+        cpu_s = after.children_user + after.children_system - before.children_user - before.children_system
+        if done.returncode:
+            return None, done.stderr.strip(), cpu_s
+        return json.loads(done.stdout), "", cpu_s
+
+    def strikes(self, name, truth, span, noise_db, room, random, keep=None):
+        """Files with blows on a body."""
+        hz = truth.frequencies_hz() * (1 + JITTER * random.standard_normal(len(truth.eigenvalues)))
+        files = []
+        for strike in range(STRIKES):
+            sound = bodies.strike(truth, hz, random.uniform(*span), noise_db, room, random, keep)
+            files.append(self.folder / f"{name}-{strike}.wav")
+            bodies.write_wave(files[-1], sound)
+        return files
+
+
+def law_decays(law, hz):
+    omega = 2 * math.pi * hz
+    eta = 0.0
+    if law["loss_factor"]:
+        points = numpy.log([(point["frequency_hz"], point["loss_factor"]) for point in law["loss_factor"]])
+        eta = numpy.exp(numpy.interp(numpy.log(hz), points[:, 0], points[:, 1]))
+    return (law["alpha1_s"] * omega**2 + law["alpha2_per_s"] + eta * omega) / 2
+
+
+def judge(truth, answer, refusal, cpu_s):
+    if answer is None:
+        return Outcome(refused=refusal.split(":")[1].strip() if ":" in refusal else refusal, cpu_s=cpu_s)
+    hz = numpy.array([line["frequency_hz"] for line in answer["lines"] if "mode" in line])
+    damping = math.inf
+    if answer["laws"]:
+        ratio = numpy.abs(numpy.log(law_decays(answer["laws"][0], hz) / truth.decays(hz)))
+        damping = math.exp(float(numpy.median(ratio))) - 1
+    return Outcome(young_error=answer["young_over_density"] / truth.young_over_density - 1,
+                   nu_error=answer["poisson_ratio"] - truth.nu, damping_error=damping, matched=answer["matched"],
+                   log_odds=answer["log_odds"], cpu_s=cpu_s)
+
+
+def cases():
+    """Yields (number, body, material, Poisson's ratio)."""
+    number = 0
+    for body, (_, materials) in bodies.BODIES.items():
+        for material in materials:
+            number += 1
+            yield number, body, material, round(float(numpy.random.default_rng(99 + number).uniform(0.18, 0.38)), 3)
+
+
+def run_row(studio, row):
+    span, noise_db, room = ROWS[row]
+    outcomes = []
+    for number, body, material, nu in cases():
+        truth = studio.truth(body, material, nu)
+        random = numpy.random.default_rng(1000 * number + list(ROWS).index(row))
+        files = studio.strikes(row, truth, span, noise_db, room, random)
+        outcomes.append(judge(truth, *studio.fit(studio.model(body, material), *files, "--density", truth.density)))
+    return outcomes
+
+
+def run_lines(studio):
+    """A plate with modes missing and false ones in their place: 4 missing, 4 + 4 false, 7 + 7 false."""
+    truth = studio.truth("plate", "aluminium", 0.33)
+    model = studio.model("plate", "aluminium")
+    outcomes = []
+    for missing, false in ((4, 0), (4, 4), (7, 7)):
+        for draw in range(8):
+            random = numpy.random.default_rng(100 * missing + 10 * false + draw)
+            hz = truth.frequencies_hz()[:14] * (1 + JITTER * random.standard_normal(14))
+            kept = random.permutation(14)[missing:]
+            lines = [*hz[kept], *numpy.exp(random.uniform(math.log(hz[0]), math.log(hz[-1]), false))]
+            table = studio.folder / "lines.csv"
+            table.write_text("frequency_hz\n" + "\n".join(f"{line:.3f}" for line in lines) + "\n")
+            outcomes.append(judge(truth, *studio.fit(model, "--modes", table, "--density", truth.density)))
+    return outcomes
+
+
+def run_wrong(studio):
+    """Each body's sound against the models of the others."""
+    outcomes = []
+    for number, body, material, nu in cases():
+        truth = studio.truth(body, material, nu)
+        random = numpy.random.default_rng(7000 + number)
+        files = studio.strikes("wrong", truth, HARD_S, 40, False, random)
+        others = [other for other in bodies.BODIES if other != body]
+        for other in (others[number % 4], others[(number + 1) % 4]):
+            model = studio.model(other, bodies.BODIES[other][1][0])
+            outcomes.append(judge(truth, *studio.fit(model, *files, "--density", truth.density)))
+    return outcomes
+
+
+def print_row(name, outcomes, damping=True):
+    answers = [outcome for outcome in outcomes if not outcome.refused]
+    many = [outcome for outcome in answers if outcome.matched >= 6]
+
+    def count(among, test):
+        return f"{sum(map(test, among))} of {len(among)}"
+
+    def median(values):
+        values = list(values)
+        return float(numpy.median(values)) if values else math.nan
+
+    print(f"| {name} | {len(outcomes)} | {len(outcomes) - len(answers)} | "
+          f"{count(many, lambda o: abs(o.young_error) < 0.005)} | {count(many, lambda o: abs(o.nu_error) < 0.02)} | "
+          + (f"{count(answers, lambda o: o.damping_error < 0.1)} | " if damping else "- | ") +
+          f"{count(answers, lambda o: abs(o.young_error) < 0.01)} | "
+          f"{100 * median(abs(o.young_error) for o in answers):.2f} %, {median(abs(o.nu_error) for o in answers):.4f}, "
+          + (f"{100 * median(o.damping_error for o in answers):.1f} %" if damping else "-") +
+          f", {median(o.matched for o in answers):.0f} | {median(o.cpu_s for o in outcomes):.1f} |", flush=True)
+
+
+def show_table(studio, rows):
+    print("| strikes | cases | refused | E/rho < 0.5 % (six lines) | nu < 0.02 (six lines) | damping < 10 % "
+          "| E/rho < 1 % | median E/rho, nu, damping, lines | CPU s |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    for row in rows:
+        print_row(row, run_row(studio, row))
+    print_row("lines missing and false", run_lines(studio), damping=False)
+
+
+def show_wrong(studio):
+    outcomes = run_wrong(studio)
+    refused = [outcome.refused for outcome in outcomes if outcome.refused]
+    reasons = ", ".join(f"{refused.count(reason)} {reason}" for reason in sorted(set(refused)))
+    print(f"\nAgainst the mesh of another body {len(refused)} of {len(outcomes)} were refused: {reasons}.")
+
+
+def show_bar(studio, recordings):
+    import meshes
+
+    recording = recordings / "steel_bar_114x25.4x3.12mm.wav"
+    if not recording.exists():
+        print("\nThe recording of the bar is missing.")
+        return
+    mesh, model = studio.folder / "steel_bar.obj", studio.folder / "steel_bar.model"
+    mesh.write_bytes(meshes.obj(*bodies.box(*BAR_SIZE_M)))
+    subprocess.run([studio.bin / "carillon-precompute", mesh, "--out", model, "--young", "210e9", "--density", "7855",
+                    "--poisson", "0.28", "--band", "20:22000", "--accuracy", "0.5%"], check=True, capture_output=True)
+    name = json.loads(studio.daemon.command("--json", "model", "import", model).stdout)["name"]
+    answer, refusal, cpu_s = studio.fit(name, recording, "--mass", BAR_MASS_KG)
+    if answer is None:
+        print(f"\nThe steel bar: {refusal}")
+        return
+    off = 100 * (answer["young_pa"] / BAR_YOUNG_PA - 1)
+    print(f"\nThe steel bar: E {answer['young_pa'] / 1e9:.1f} GPa ({off:+.2f} % of 214.6), "
+          f"nu {answer['poisson_ratio']:.3f}, {answer['matched']} of {len(answer['lines'])} lines, "
+          f"{100 * answer['rms']:.2f} % apart, log odds {answer['log_odds']:.1f}, {cpu_s:.1f} s of CPU.")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser.add_argument("--recordings", type=pathlib.Path, default=HERE.parents[3] / "shared/recordings")
+    parser.add_argument("--rows", default=",".join(ROWS))
+    parser.add_argument("--parts", default="table,wrong,bar")
+    options = parser.parse_args()
+    build = options.build.resolve()
+    os.environ["CARILLON_BIN_DIR"] = str(build / "bin")
+    root = HERE.parents[2]
+    sys.path[:0] = [str(build / "client_sdk/python"), str(root / "tests/integration"), str(root / "client_sdk/python")]
+    started = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+        studio = Studio(build, pathlib.Path(folder))
+        try:
+            if "table" in options.parts:
+                show_table(studio, options.rows.split(","))
+            if "wrong" in options.parts:
+                show_wrong(studio)
+            if "bar" in options.parts:
+                show_bar(studio, options.recordings)
+        finally:
+            studio.daemon.stop()
+    print(f"\n{time.monotonic() - started:.0f} s.")
+
+
+if __name__ == "__main__":
+    main()
