@@ -70,6 +70,15 @@ struct ImportOptions {
   MaterialFigures material;  ///< of objects that name none; overrides that which a glTF states
 };
 
+/// The options of `carillon model tune`.
+struct TuneOptions {
+  std::string model;
+  MaterialFigures material;  ///< empty: that which the model was made with
+  uint32_t mode = 1;         ///< counted from 1
+  double to_hz = 0;
+  std::string by = "size";  ///< or "length", "thickness", "x", "y", "z"
+};
+
 /// The options of `carillon job run`.
 struct RunJobOptions {
   std::string digest;
@@ -157,6 +166,11 @@ absl::Status UpdateModel(const client::Client& daemon, const std::string& text,
                          v1::UpdateModalModelRequest change, bool json);
 absl::Status ExportModel(const client::Client& daemon, const ExportOptions& options, bool json);
 absl::Status ImportModel(const client::Client& daemon, const ImportOptions& options, bool json);
+/// Finds the size, or the length of one axis, at which a mode of a model has a pitch. Without a
+/// change of size, stores the model of the stretched body, labelled "LABEL_tuned". Errors: those of
+/// FindModel and of CreateModalModel, InvalidArgument (INVALID_SETTINGS), FailedPrecondition
+/// (PITCH_NOT_REACHED).
+absl::Status TuneModel(const client::Client& daemon, const TuneOptions& options, bool json);
 absl::Status ShowDatabaseStats(const client::Client& daemon, bool json);
 /// Writes a copy of the database to a file. Unless `json` is true, prints nothing.
 absl::Status BackUpDatabase(const client::Client& daemon, const std::string& file, bool json);

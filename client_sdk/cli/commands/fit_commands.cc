@@ -145,7 +145,8 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
 Json ToJson(const fit::MeasuredMode& mode) {
   return {{"frequency_hz", mode.frequency_hz}, {"frequency_error_hz", mode.frequency_error_hz},
           {"decay_per_s", mode.decay_per_s},   {"decay_error_per_s", mode.decay_error_per_s},
-          {"level_db", mode.level_db},         {"signal_to_noise_db", mode.signal_to_noise_db}};
+          {"level_db", mode.level_db},         {"signal_to_noise_db", mode.signal_to_noise_db},
+          {"near_room", mode.near_room}};
 }
 
 Json ToJson(const fit::DampingLaw& law) {
@@ -160,7 +161,6 @@ Json ToJson(const fit::DampingLaw& law) {
 Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
   Json json = ToJson(line.measured);
   json["body"] = sources[line.body].body.name;
-  json["near_room"] = line.measured.near_room;
   if (!line.mode) return json;
   json["mode"] = *line.mode + 1;
   json["model_hz"] = line.model_hz;
@@ -169,8 +169,20 @@ Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
   return json;
 }
 
+/// The frequencies of all modes of a body, with the material that was found.
+Json ToJson(const fit::FittedBody& body, const fit::MaterialFit& fit) {
+  Json hz = Json::array();
+  for (size_t mode = 0; mode < body.lines.eigenvalues.size(); ++mode) {
+    hz.push_back(std::sqrt(fit.young_over_density) *
+                 body.lines.HertzAtUnitSpeed(mode, fit.poisson_ratio));
+  }
+  return {{"name", body.name}, {"modes_hz", hz}};
+}
+
 Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
-  Json lines = Json::array(), candidates = Json::array(), laws = Json::array();
+  Json lines = Json::array(), candidates = Json::array(), laws = Json::array(),
+       bodies = Json::array();
+  for (const Source& source : sources) bodies.push_back(ToJson(source.body, fit));
   for (const fit::FittedLine& line : fit.lines) lines.push_back(ToJson(line, sources));
   for (const fit::DampingLaw& law : fit.laws) laws.push_back(ToJson(law));
   for (const fit::Match& match : fit.candidates) {
@@ -191,6 +203,7 @@ Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
           {"log_odds", fit.log_odds},
           {"laws", laws},
           {"lines", lines},
+          {"bodies", bodies},
           {"candidates", candidates}};
 }
 
@@ -263,8 +276,10 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
       "E.\n");
 }
 
-absl::Status WriteResidual(const std::string& path, const Source& source,
-                           const fit::MaterialFit& fit) {
+/// Writes what the matched modes leave of the first strike, and returns its shares of the energy.
+absl::StatusOr<std::vector<fit::ResidualShare>> WriteResidual(const std::string& path,
+                                                              const Source& source,
+                                                              const fit::MaterialFit& fit) {
   std::vector<fit::MeasuredMode> matched;
   for (const fit::FittedLine& line : fit.lines) {
     if (line.body == 0 && line.mode) matched.push_back(line.measured);
@@ -280,7 +295,7 @@ absl::Status WriteResidual(const std::string& path, const Source& source,
     absl::FPrintF(stderr, "%s: %.3g %% of the energy from %g to %g ms is no matched mode's\n", path,
                   100 * share.share, 1000 * share.from_s, 1000 * share.to_s);
   }
-  return absl::OkStatus();
+  return residual.shares;
 }
 
 }  // namespace
@@ -333,11 +348,17 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
   }
   ASSIGN_OR_RETURN(fit, fitted());
   if (!options.out.empty()) RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources)));
+  std::vector<fit::ResidualShare> rest;
   if (!options.residual.empty() && !sources[0].extracted.rings.empty()) {
-    RETURN_IF_ERROR(WriteResidual(options.residual, sources[0], fit));
+    ASSIGN_OR_RETURN(rest, WriteResidual(options.residual, sources[0], fit));
   }
   if (json) {
-    absl::PrintF("%s\n", ToJson(fit, sources).dump());
+    Json found = ToJson(fit, sources);
+    for (const fit::ResidualShare& share : rest) {
+      found["residual"].push_back(
+          {{"from_s", share.from_s}, {"to_s", share.to_s}, {"share", share.share}});
+    }
+    absl::PrintF("%s\n", found.dump());
   } else {
     PrintFit(fit, sources);
   }

@@ -249,6 +249,30 @@ void AddModelImport(CLI::App& app, Program& program) {
   });
 }
 
+void AddModelTune(CLI::App& app, Program& program) {
+  auto options = std::make_shared<TuneOptions>();
+  CLI::App& command = *app.add_subcommand(
+      "tune", "Find the size, or the length along one axis, that gives a mode its pitch");
+  command.add_option("model", options->model, kModelName)->required();
+  AddParsed(command, "--to", ParsePitch, "a note such as A4, C#5 or Bb3, or Hz",
+            "The pitch: a note (A4 is 440 Hz), or Hz",
+            [options](double hz) { options->to_hz = hz; })
+      ->required();
+  command.add_option("--mode", options->mode,
+                     "The mode, counted from 1 as model show lists them [1]");
+  command
+      .add_option("--by", options->by,
+                  "What is changed: the size of the whole body, its length or thickness (the axis "
+                  "of its file that is longest or shortest), or the axis x, y or z [size]")
+      ->check(CLI::IsMember({"size", "length", "thickness", "x", "y", "z"}).description(""));
+  AddMaterial(command, options->material);
+  command.callback([&program, options] {
+    program.command = [&program, options] {
+      return TuneModel(*program.Daemon(), *options, program.json);
+    };
+  });
+}
+
 }  // namespace
 
 void AddModel(CLI::App& app, Program& program) {
@@ -261,6 +285,7 @@ void AddModel(CLI::App& app, Program& program) {
   AddModelTag(model, program);
   AddModelExport(model, program);
   AddModelImport(model, program);
+  AddModelTune(model, program);
 }
 
 }  // namespace carillon::cli

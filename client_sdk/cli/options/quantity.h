@@ -16,4 +16,8 @@ std::optional<int64_t> ParseTimeUnixMs(const std::string& text);
 /// or decibels, such as "-6dB".
 std::optional<double> ParseGain(const std::string& text);
 
+/// Parses a pitch and returns it in Hz. The text is a note of the equal temperament with A4 at 440
+/// Hz, such as "A4", "C#5" or "Bb3", or a frequency from 1 Hz to 1 MHz, such as "587.33".
+std::optional<double> ParsePitch(const std::string& text);
+
 }  // namespace carillon::cli

@@ -36,5 +36,18 @@ TEST(Quantity, AGainIsAFactorOrDecibels) {
   }
 }
 
+TEST(Quantity, APitchIsANoteOrHertz) {
+  EXPECT_DOUBLE_EQ(*ParsePitch("A4"), 440);
+  EXPECT_DOUBLE_EQ(*ParsePitch("a5"), 880);
+  EXPECT_NEAR(*ParsePitch("C4"), 261.6256, 1e-4);
+  EXPECT_NEAR(*ParsePitch("D5"), 587.3295, 1e-4);
+  EXPECT_DOUBLE_EQ(*ParsePitch("C#3"), *ParsePitch("Db3"));
+  EXPECT_DOUBLE_EQ(*ParsePitch("Cb4"), *ParsePitch("B3"));
+  EXPECT_EQ(ParsePitch("587.33"), 587.33);
+  for (const char* text : {"", "A", "H4", " A4", "A##4", "A4x", "-440", "0", "nan", "A99"}) {
+    EXPECT_FALSE(ParsePitch(text)) << text;
+  }
+}
+
 }  // namespace
 }  // namespace carillon::cli

@@ -12,7 +12,7 @@
 whose `reason` programs can act upon.
 """
 
-from carillon import aio, motion
+from carillon import aio, fit, motion
 from carillon.address import default_server
 from carillon.client import Client, connect
 from carillon.contacts import ContactForces, Contacts, Impacts, Poses, striker
@@ -32,5 +32,5 @@ from carillon.version import __version__
 __all__ = ["Ambisonics", "CarillonError", "Client", "ContactForces", "ContactStream", "ContactWarning", "Contacts",
            "Ears", "HearingEnvironment", "Impacts", "Job", "LabelWarning", "MeshFile", "Model", "Omni", "Performance",
            "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Stereo", "Trace", "TransferWarning",
-           "UnitWarning", "__version__", "aio", "connect", "default_server", "material", "motion",
-           "striker"]
+           "UnitWarning", "__version__", "aio", "connect", "default_server", "fit", "material",
+           "motion", "striker"]

@@ -11,16 +11,13 @@ The program `carillon foley` does the work (docs/motion.md), so it must be insta
 from __future__ import annotations
 
 import dataclasses
-import os
 import pathlib
 import re
-import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
-from carillon.address import default_server
-from carillon.errors import CarillonError
+from carillon import programs
 from carillon.traces import Trace
 
 
@@ -77,16 +74,7 @@ def contacts(bodies: Mapping[str, Body], times: Sequence[float], poses: Mapping[
         words += [] if friction is None else ["--friction", str(friction)]
         words += ["--force"] if force else []
         trace = folder / "found.contacts"
-        done = subprocess.run([program, "--server", server or default_server(), "foley",
-                               os.fspath(folder / "poses.npz"), "--trace", os.fspath(trace), *words],
-                              capture_output=True, text=True)
-        if done.returncode != 0:
-            raise _error(done.stderr)
-        figures = re.search(r"unexplained (\S+) %, ambiguous (\S+) %", done.stderr)
-        assert figures, done.stderr
-        return Found(Trace.read(trace), float(figures[1]) / 100, float(figures[2]) / 100, done.stderr)
-
-
-def _error(text: str) -> CarillonError:
-    refusal = re.search(r"^carillon: ([A-Z_]+): (.*)$", text, re.MULTILINE)
-    return CarillonError(refusal[1], refusal[2]) if refusal else CarillonError("INTERNAL", text)
+        report = programs.run(program, server, "foley", folder / "poses.npz", "--trace", trace, *words).stderr
+        figures = re.search(r"unexplained (\S+) %, ambiguous (\S+) %", report)
+        assert figures, report
+        return Found(Trace.read(trace), float(figures[1]) / 100, float(figures[2]) / 100, report)

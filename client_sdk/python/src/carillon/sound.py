@@ -61,6 +61,19 @@ class Sound:
         with open(path, "wb") as file:
             file.write(self.wave_bytes())
 
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Sound:
+        """Reads a WAV file of 16, 24 or 32-bit integers. Raises wave.Error for another."""
+        with wave.open(os.fspath(path), "rb") as file:
+            width, channels = file.getsampwidth(), file.getnchannels()
+            data = numpy.frombuffer(file.readframes(file.getnframes()), numpy.uint8).reshape(-1, width)
+            if width < 2:
+                raise wave.Error(f"{os.fspath(path)} has samples of 8 bits")
+            words = numpy.zeros((len(data), 4), numpy.uint8)
+            words[:, 4 - width:] = data
+            samples = words.view("<i4").astype(numpy.float32) / numpy.float32(2**31)
+            return cls(samples.reshape(-1, channels), file.getframerate())
+
     def wave_bytes(self) -> bytes:
         words = numpy.rint(numpy.clip(self.samples, -1, 1) * (2**23 - 1)).astype("<i4")
         file = io.BytesIO()

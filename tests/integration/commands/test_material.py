@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`carillon material fit` and carillon.fit: the material of a plate is found from the sound that the daemon itself
+renders of it, with its residual and its picture."""
+
+import unittest
+
+import matplotlib
+import numpy
+
+import carillon
+import meshes
+from daemon import BIN, DaemonTest
+
+matplotlib.use("Agg")
+SIDES_M = (0.12, 0.08, 0.008)
+YOUNG_PA, POISSON, DENSITY, LOSS = 71e9, 0.31, 2600, 1e-3
+PLACES = ("0.11,0.07,0.008", "0.02,0.051,0.008", "0.067,0.012,0.008")
+
+
+class Material(DaemonTest):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        mesh = cls.folder / "plate.obj"
+        mesh.write_bytes(meshes.obj(*meshes.box(SIDES_M)))
+        figures = ("--young", YOUNG_PA, "--density", DENSITY, "--loss-factor", LOSS)
+        options = (mesh, "--wait", "--without-transfer", "--band", "20:15000", *figures)
+        # A real plate has no mesh, and the fit takes the errors of the model's mesh off: this one's must be small.
+        cls.daemon.command("model", "create", *options, "--label", "true", "--poisson", POISSON, "--accuracy", "0.5%")
+        cls.taps = [cls.folder / f"tap{number}.wav" for number in range(len(PLACES))]
+        for tap, place in zip(cls.taps, PLACES):
+            cls.daemon.command("strike", "true", "--point", place, "--impulse", "0,0,-0.002", "--duration", 5e-5,
+                               "--seconds", 1.5, "--normalize", "--out", tap)
+        # The fit knows the body by a model of another Poisson's ratio.
+        cls.daemon.command("model", "create", *options, "--label", "plate", "--poisson", 0.28)
+        cls.own = {"program": str(BIN / "carillon"), "server": cls.daemon.server}
+        cls.found = carillon.fit.material("plate", cls.taps, density=DENSITY, **cls.own)
+
+    def assert_found(self, found):
+        self.assertLess(abs(found.young_pa / YOUNG_PA - 1), 0.01)  # twice the accuracy of what was heard
+        self.assertLess(abs(found.poisson_ratio - POISSON), 0.02)
+        self.assertGreaterEqual(found.matched, 6)
+
+    def test_fit_finds_material_damping_and_residual(self):
+        self.assert_found(self.found)
+        self.assertAlmostEqual(self.found.material.young_pa / self.found.young_pa, 1, delta=1e-5)
+        rates = [line.law_per_s / (LOSS * numpy.pi * line.frequency_hz) for line in self.found.lines if line.mode]
+        self.assertLess(abs(numpy.median(rates) - 1), 0.1)
+        # From 20 to 100 ms there is nothing but the modes, of which those that no line was found for are the rest.
+        late = [share for begin, end, share in self.found.residual_shares if begin == 0.02]
+        self.assertLess(late[0], 0.05)
+        self.assertGreater(self.found.residual.seconds, 1)
+        self.assertEqual(carillon.fit.extract(self.taps, program=self.own["program"]).strike_count, len(PLACES))
+
+    def test_the_material_file_makes_a_model_that_sounds_as_recorded(self):
+        with carillon.connect(self.daemon.server) as client:
+            again = client.create_model(str(self.folder / "plate.obj"), material=self.found.material, label="again",
+                                        max_frequency_hz=9000, accuracy=0.005)
+            true = [model for model in client.models() if model.label == "true"][0]
+            least = min(again.mode_count, 6)
+            ratio = numpy.array(again.frequencies()[:least]) / numpy.array(true.frequencies()[:least])
+        self.assertLess(abs(ratio - 1).max(), 0.005)
+
+    def test_the_picture_has_each_line_and_mode_once(self):
+        spectrum, decays = self.found.plot()
+        drawn = {line.get_label(): line.get_xdata() for line in spectrum.lines}
+        matched = [line.frequency_hz for line in self.found.lines if line.mode]
+        label = [name for name in drawn if "from their modes" in name][0]
+        numpy.testing.assert_allclose(sorted(drawn[label]), sorted(matched))
+        self.assertIn("GPa", spectrum.get_title())
+        self.assertTrue(decays.get_xlabel().endswith("/ Hz"))
+
+    def test_a_table_of_frequencies_is_enough_and_a_noise_is_refused(self):
+        table = self.folder / "lines.csv"
+        table.write_text("frequency_hz\n" + "".join(f"{line.frequency_hz}\n" for line in self.found.lines))
+        self.assert_found(carillon.fit.material("plate", [table], density=DENSITY, **self.own))
+        noise = numpy.random.default_rng(1).standard_normal((48000, 1)).astype(numpy.float32) * 0.1
+        carillon.Sound(noise, 48000).save(self.folder / "noise.wav")
+        with self.assertRaises(carillon.CarillonError) as refused:
+            carillon.fit.material("plate", [self.folder / "noise.wav"], density=DENSITY, **self.own)
+        self.assertIn(refused.exception.reason, ("TOO_FEW_MODES", "RECORDING_TOO_NOISY"))
+
+
+if __name__ == "__main__":
+    unittest.main()
