@@ -21,7 +21,7 @@ struct ChosenModel {
   std::optional<uint64_t> mesh;  ///< the mesh of such a node
 };
 
-/// Chooses a model by the `pick` of ReadGltfModel. Errors: InvalidArgument (MODEL_FILE_INCOMPLETE:
+/// Chooses a model by the `pick` of ReadGltfModel. Errors: InvalidArgument (MODEL_FILE_MALFORMED:
 /// there is no such model; MODEL_FILE_AMBIGUOUS: there are several, or the nodes of the model
 /// differ in scale; MODEL_FILE_MALFORMED). Throws a GltfFault if the tree of nodes is damaged.
 absl::StatusOr<ChosenModel> ChooseModel(const GltfDocument& file, const std::string& pick);

@@ -12,12 +12,12 @@ absl::Status Malformed(absl::string_view what) {
 }
 
 absl::Status Incomplete(absl::string_view what, absl::string_view repair) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "MODEL_FILE_INCOMPLETE",
+  return Refusal(absl::StatusCode::kInvalidArgument, "MODEL_FILE_MALFORMED",
                  absl::StrCat(what, ": ", repair));
 }
 
 absl::Status TooLarge(absl::string_view what) {
-  return Refusal(absl::StatusCode::kResourceExhausted, "MODEL_FILE_TOO_LARGE",
+  return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
                  absl::StrCat(what, ": use the stored form (.model)"));
 }
 

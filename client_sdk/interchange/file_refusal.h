@@ -11,11 +11,11 @@ namespace carillon::interchange {
 absl::Status Malformed(absl::string_view what);
 
 /// Refuses a file that is whole but lacks a part of a modal model: InvalidArgument
-/// (MODEL_FILE_INCOMPLETE). `repair` says how to add that part.
+/// (MODEL_FILE_MALFORMED). `repair` says how to add that part.
 absl::Status Incomplete(absl::string_view what, absl::string_view repair);
 
 /// Refuses a file that is larger than its format or the reader allows: ResourceExhausted
-/// (MODEL_FILE_TOO_LARGE).
+/// (MODAL_MODEL_TOO_LARGE).
 absl::Status TooLarge(absl::string_view what);
 
 /// Refuses a file for which the memory did not suffice: ResourceExhausted (OUT_OF_MEMORY).

@@ -23,7 +23,7 @@ struct GltfNames {
 
 /// Writes `model` as it sounds with `material`, which must have every figure. Modes that the
 /// material overdamps have no frequency and are left out. Errors: FailedPrecondition
-/// (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND), ResourceExhausted (MODEL_FILE_TOO_LARGE), Internal
+/// (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND), ResourceExhausted (MODAL_MODEL_TOO_LARGE), Internal
 /// (OUTPUT_NOT_WRITABLE).
 absl::Status WriteGltfModel(const std::string& path, const StoredModel& model,
                             const v1::Material& material, const GltfNames& names, bool binary);
@@ -38,7 +38,7 @@ struct GltfModel {
 /// Reads a modal model from a glTF, text or binary. `pick` is the name or the number of the model,
 /// or the name of a node that sounds with it; it may be empty if the file has one model. A figure
 /// of `material` overrides that of the file; one of them must be there. Errors: NotFound
-/// (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE,
+/// (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED,
 /// MODEL_FILE_AMBIGUOUS), ResourceExhausted (OUT_OF_MEMORY).
 absl::StatusOr<GltfModel> ReadGltfModel(const std::string& path, const std::string& pick,
                                         const v1::Material& material);

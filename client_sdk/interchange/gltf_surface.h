@@ -16,7 +16,7 @@ struct MeshSurface {
 };
 
 /// Reads the triangles of all primitives of a mesh, one primitive after the other. Throws a
-/// GltfFault if the mesh is damaged. Errors: InvalidArgument (MODEL_FILE_INCOMPLETE: the mesh has
+/// GltfFault if the mesh is damaged. Errors: InvalidArgument (MODEL_FILE_MALFORMED: the mesh has
 /// no triangles).
 absl::StatusOr<MeshSurface> ReadMesh(const GltfDocument& file, uint64_t mesh);
 

@@ -26,7 +26,7 @@ class GltfWriter {
 
   /// Writes an asset with the arrays, and adds their description to the asset. The result is one
   /// binary file, or a text with the arrays in a data URI. The file gets the name `path` when it is
-  /// complete. Errors: Internal (OUTPUT_NOT_WRITABLE), ResourceExhausted (MODEL_FILE_TOO_LARGE: a
+  /// complete. Errors: Internal (OUTPUT_NOT_WRITABLE), ResourceExhausted (MODAL_MODEL_TOO_LARGE: a
   /// binary file over 4 GiB).
   absl::Status Write(const std::string& path, nlohmann::json asset, bool binary) const;
 

@@ -18,8 +18,8 @@ absl::Status WriteNpz(const std::string& path, const StoredModel& model);
 
 /// Reads a model. The file needs "eigenvalues", "vertices", "triangles", "shapes", and either
 /// "header" or the number "poisson_ratio"; Complete() adds the other parts. Errors: NotFound
-/// (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED, MODEL_FILE_INCOMPLETE),
-/// ResourceExhausted (MODEL_FILE_TOO_LARGE, OUT_OF_MEMORY).
+/// (FILE_NOT_FOUND), InvalidArgument (MODEL_FILE_MALFORMED),
+/// ResourceExhausted (MODAL_MODEL_TOO_LARGE, OUT_OF_MEMORY).
 absl::StatusOr<StoredModel> ReadNpz(const std::string& path);
 
 }  // namespace carillon::interchange

@@ -22,8 +22,8 @@ class ZipReader {
   ~ZipReader();
 
   /// Returns the file `name` of the archive, or nullopt if there is none. Errors: InvalidArgument
-  /// (MODEL_FILE_MALFORMED: the file is damaged), ResourceExhausted (MODEL_FILE_TOO_LARGE: the file
-  /// is larger than 4 GiB).
+  /// (MODEL_FILE_MALFORMED: the file is damaged), ResourceExhausted (MODAL_MODEL_TOO_LARGE: the
+  /// file is larger than 4 GiB).
   absl::StatusOr<std::optional<std::string>> Read(const std::string& name) const;
 
  private:

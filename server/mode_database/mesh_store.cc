@@ -191,7 +191,7 @@ absl::Status MeshStore::WriteFile(const std::string& digest, const std::filesyst
     return connection.Run("DELETE FROM meshes WHERE digest = ?", {digest});
   });
   if (!status.ok()) return status;
-  return Refusal(absl::StatusCode::kDataLoss, "MESH_CORRUPT",
+  return Refusal(absl::StatusCode::kDataLoss, "DATABASE_CORRUPT",
                  absl::StrCat("the stored mesh ", digest,
                               " has changed on the disk: upload it again, and check the disk"));
 }

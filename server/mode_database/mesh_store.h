@@ -76,8 +76,8 @@ class MeshStore {
   absl::StatusOr<StoredMesh> Find(const std::string& digest);
 
   /// Writes the mesh to a new file that only its owner may read. Errors: NotFound (MESH_NOT_FOUND),
-  /// DataLoss (MESH_CORRUPT: the stored bytes do not match the digest; the mesh is deleted, so that
-  /// it can be stored again).
+  /// DataLoss (DATABASE_CORRUPT: the stored bytes do not match the digest; the mesh is deleted, so
+  /// that it can be stored again).
   absl::Status WriteFile(const std::string& digest, const std::filesystem::path& file);
 
   /// Deletes meshes that no model and no job refers to and that were not uploaded in the last

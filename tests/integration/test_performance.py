@@ -146,7 +146,7 @@ class PerformanceTest(DaemonTest):
         sound = self.begin()
         self.assertEqual(reason_of(lambda: sound.step(impacts=impact(9))), "OBJECT_NOT_FOUND")
         sound.step(impacts=impact(1))  # it goes on
-        self.assertEqual(reason_of(lambda: sound.step(impacts=impact(1, environments=[1]))), "UNKNOWN_ENVIRONMENT")
+        self.assertEqual(reason_of(lambda: sound.step(impacts=impact(1, environments=[1]))), "PERFORMANCE_MALFORMED")
         for settings, reason in ((dict(environments=5000), "INVALID_SETTINGS"), (dict(latency=1), "INVALID_SETTINGS"),
                                  (dict(microphones=[carillon.Ambisonics(order=4)]), "INVALID_SETTINGS"),
                                  (dict(sample_rate_hz=10), "INVALID_SETTINGS")):

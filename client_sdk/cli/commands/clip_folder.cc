@@ -59,7 +59,7 @@ absl::StatusOr<std::vector<std::string>> ListTraces(const fs::path& folder) {
   }
   std::ranges::sort(names);
   if (!names.empty() && !error) return names;
-  return Refusal(absl::StatusCode::kNotFound, "NO_TRACES",
+  return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                  absl::StrCat(folder.string(), ": ", error ? error.message() : "has no *.contacts",
                               "; name a folder of contact traces"));
 }

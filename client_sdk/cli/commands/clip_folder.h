@@ -12,7 +12,7 @@
 namespace carillon::cli {
 
 /// Returns the names of the contact traces (*.contacts) in `folder` without their suffix, in order.
-/// Errors: NotFound (NO_TRACES).
+/// Errors: NotFound (FILE_NOT_FOUND).
 absl::StatusOr<std::vector<std::string>> ListTraces(const std::filesystem::path& folder);
 
 /// A file descriptor that holds a lock until it is destroyed or its process ends.

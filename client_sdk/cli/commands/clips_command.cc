@@ -325,7 +325,7 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
   }
   RETURN_IF_ERROR(stopped);
   if (run.failed_count() == 0) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kFailedPrecondition, "CLIPS_FAILED",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "SOME_FAILED",
                  absl::StrCat(Counted(run.failed_count(), "clip"), " could not be rendered; ",
                               folder.Final("manifest.jsonl").string(),
                               " says why; repair what it names and run the command again"));

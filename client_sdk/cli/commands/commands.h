@@ -152,7 +152,7 @@ struct RenderOptions {
 /// JSON these are the members of GetMixerResponse and, in "server", those of GetServerInfoResponse.
 absl::Status ShowStatus(const client::Client& daemon, const std::string& server, bool json);
 /// Creates the models of files. A file that gives no model does not stop the others. Errors: that
-/// of the file if there is one file; otherwise FailedPrecondition (MODELS_FAILED), Internal
+/// of the file if there is one file; otherwise FailedPrecondition (SOME_FAILED), Internal
 /// (OUTPUT_NOT_WRITABLE: the report), Unavailable (SERVER_UNAVAILABLE), which stops all.
 absl::Status CreateModel(const client::Client& daemon, const CreateModelOptions& options,
                          bool json);
@@ -220,7 +220,7 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
                     std::vector<JsonMember> members = {});
 /// Renders the contact traces of a folder into another folder (ClipFolder). Clips that are there
 /// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
-/// (NO_TRACES), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (CLIPS_FAILED), Cancelled
+/// (FILE_NOT_FOUND), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (SOME_FAILED), Cancelled
 /// (RENDERING_STOPPED: `stop` has arrived).
 absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options,
                          const StopSignal& stop, bool json);

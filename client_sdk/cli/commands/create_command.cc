@@ -102,7 +102,7 @@ class ModelCreation {
       : daemon_(daemon), options_(options), json_(json) {}
 
   /// Errors: Internal (OUTPUT_NOT_WRITABLE), Unavailable (SERVER_UNAVAILABLE), that of the file if
-  /// there is one file, FailedPrecondition (MODELS_FAILED) if there are several.
+  /// there is one file, FailedPrecondition (SOME_FAILED) if there are several.
   absl::Status Run() {
     RETURN_IF_ERROR(OpenReport());
     for (const std::string& file : options_.files) {
@@ -112,7 +112,7 @@ class ModelCreation {
       RETURN_IF_ERROR(FinishOldest());
     }
     if (failed_count_ == 0 || options_.files.size() == 1) return last_error_;
-    return Refusal(absl::StatusCode::kFailedPrecondition, "MODELS_FAILED",
+    return Refusal(absl::StatusCode::kFailedPrecondition, "SOME_FAILED",
                    absl::StrCat(failed_count_, " of ", Counted(options_.files.size(), "file"),
                                 " gave no model; the messages above",
                                 options_.report.empty() ? "" : " and the rows of the report",

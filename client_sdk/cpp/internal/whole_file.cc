@@ -35,7 +35,7 @@ absl::Status NotWritable(const std::string& path, absl::string_view why) {
 }
 
 absl::Status InUse(const std::string& path, const std::string& companion) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "OUTPUT_IN_USE",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "OUTPUT_NOT_WRITABLE",
                  absl::StrCat(path, " belongs to the database of a daemon, because ", companion,
                               " is beside it, and stays as it is: name another file"));
 }

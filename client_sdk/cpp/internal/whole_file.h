@@ -19,7 +19,7 @@ namespace carillon::client {
 class WholeFile {
  public:
   /// Begins to write the file. If `path` is a symbolic link, the file to which the link points is
-  /// written. Errors: Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (OUTPUT_IN_USE: the file
+  /// written. Errors: Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (the same: the file
   /// is the database of a daemon, or belongs to such a database).
   static absl::StatusOr<WholeFile> Create(const std::string& path);
 

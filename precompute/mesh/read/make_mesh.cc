@@ -175,7 +175,7 @@ absl::Status CheckMidsideNodes(const TetMesh& mesh) {
       const Point middle = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
       if (Distance(at(4 + edge), middle) < kMostCurved * Distance(a, b)) continue;
       return Refuse(
-          "MESH_MIDSIDE_NODE_MISPLACED",
+          "MESH_ELEMENT_INVERTED",
           absl::StrCat("tetrahedron ", e,
                        " (counted from zero) has a mid-side node more "
                        "than 0.35 of its edge from the middle, near (",

@@ -12,7 +12,7 @@ namespace carillon::precompute {
 /// their order. Mirrored tetrahedra are reoriented.
 ///
 /// Errors: MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE, MESH_EMPTY, MESH_ZERO_VOLUME,
-/// MESH_MIDSIDE_NODE_MISPLACED, MESH_NOT_MANIFOLD, MESH_SEVERAL_PIECES.
+/// MESH_ELEMENT_INVERTED, MESH_NOT_MANIFOLD, MESH_SEVERAL_PIECES.
 absl::StatusOr<NamedMesh> MakeMesh(ElementFile file);
 
 }  // namespace carillon::precompute

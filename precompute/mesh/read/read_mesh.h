@@ -18,7 +18,7 @@ namespace carillon::precompute {
 /// length of one unit of the file.
 ///
 /// Errors: MESH_FORMAT_UNKNOWN, MESH_UNREADABLE, MESH_NOT_FINITE, MESH_INDEX_OUT_OF_RANGE,
-/// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_MIDSIDE_NODE_MISPLACED,
+/// MESH_TOO_LARGE, MESH_ELEMENT_UNSUPPORTED, MESH_ZERO_VOLUME, MESH_ELEMENT_INVERTED,
 /// MESH_SEVERAL_PIECES, MESH_NOT_MANIFOLD.
 ///
 /// A new format is added to kMeshFormats (proto/cpp/mesh_format.h) and, if its files have elements,

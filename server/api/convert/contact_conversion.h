@@ -24,7 +24,7 @@ void ReadRows(const v1::ContactColumns& columns, std::span<const int> rows,
               const HertzContact& hertz, ContactIntake& intake);
 
 /// Gives `intake` a whole step, in the order poses, contacts as rows, contacts as columns. Contacts
-/// that cannot be read count as rejected (CONTACT_MALFORMED, COLUMNS_MISMATCHED, UNKNOWN_STRIKER).
+/// that cannot be read count as rejected (CONTACT_MALFORMED, UNKNOWN_STRIKER).
 /// Errors: those of ContactIntake::BeginStep.
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake);
 

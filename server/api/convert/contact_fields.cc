@@ -146,7 +146,7 @@ void ReadFields(const v1::ContactColumns& columns, int row, Target& target) {
 }
 
 absl::Status Mismatched(absl::string_view message) {
-  return Refusal(absl::StatusCode::kInvalidArgument, "COLUMNS_MISMATCHED", message);
+  return Refusal(absl::StatusCode::kInvalidArgument, "CONTACT_MALFORMED", message);
 }
 
 /// The size of a column, and the numbers from which its right size follows.

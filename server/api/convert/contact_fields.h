@@ -23,7 +23,7 @@ absl::Status ReadRow(const v1::Contact& row, ObjectForce& force);
 absl::Status ReadRow(const v1::Contact& row, ObjectTouch& reported);
 
 /// Checks that columns have numbers for each of their objects. Errors: InvalidArgument
-/// (COLUMNS_MISMATCHED).
+/// (CONTACT_MALFORMED).
 absl::Status Validate(const v1::ContactColumns& columns);
 absl::Status Validate(const v1::PoseColumns& columns);
 

@@ -58,7 +58,7 @@ absl::Status Validate(const v1::MicrophonePoses& poses, size_t microphone_count)
   const bool rotated = poses.orientation_size() > 0;
   if (poses.position_m_size() != 3 * count || (rotated && poses.orientation_size() != 4 * count)) {
     return Invalid(
-        "COLUMNS_MISMATCHED",
+        "CONTACT_MALFORMED",
         absl::StrCat("microphone_poses has ", count, " microphones, ", poses.position_m_size(),
                      " coordinates and ", poses.orientation_size(),
                      " numbers of orientations; give 3 and 4, or no orientation, for "
@@ -66,7 +66,7 @@ absl::Status Validate(const v1::MicrophonePoses& poses, size_t microphone_count)
   }
   for (const uint32_t microphone : poses.microphone()) {
     if (microphone < microphone_count) continue;
-    return Invalid("UNKNOWN_MICROPHONE",
+    return Invalid("PERFORMANCE_MALFORMED",
                    absl::StrCat("microphone_poses has microphone ", microphone,
                                 "; the settings have ", microphone_count, ", counted from 0"));
   }
@@ -88,7 +88,7 @@ Pose ReadPose(const v1::MicrophonePoses& poses, int row) {
 absl::Status RowsByEnvironment::Sort(std::span<const uint32_t> environments,
                                      size_t environment_count) {
   if (!environments.empty() && environments.size() != rows_.size()) {
-    return Invalid("COLUMNS_MISMATCHED",
+    return Invalid("CONTACT_MALFORMED",
                    absl::StrCat("environment has ", environments.size(), " numbers for ",
                                 rows_.size(), " rows; give one for each row, or none"));
   }
@@ -97,7 +97,7 @@ absl::Status RowsByEnvironment::Sort(std::span<const uint32_t> environments,
   };
   for (size_t row = 0; row < rows_.size(); ++row) {
     if (environment_of(row) >= environment_count) {
-      return Invalid("UNKNOWN_ENVIRONMENT",
+      return Invalid("PERFORMANCE_MALFORMED",
                      absl::StrCat("row ", row, " is of environment ", environment_of(row),
                                   "; the performance has ", environment_count, ", counted from 0"));
     }

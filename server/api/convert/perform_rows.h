@@ -19,7 +19,7 @@ class RowsByEnvironment {
  public:
   /// `environments` has the environment of each of `row_count` rows. If it is empty, all rows are
   /// in environment 0. `before(a, b)` orders the rows of one environment. Errors: InvalidArgument
-  /// (COLUMNS_MISMATCHED, UNKNOWN_ENVIRONMENT).
+  /// (CONTACT_MALFORMED, PERFORMANCE_MALFORMED).
   template <typename Before>
   static absl::StatusOr<RowsByEnvironment> Make(std::span<const uint32_t> environments,
                                                 int row_count, size_t environment_count,
@@ -55,8 +55,8 @@ class RowsByEnvironment {
 /// The contacts and poses of a step of a performance, by environment.
 class PerformRows {
  public:
-  /// `step` must outlive the rows. Errors: InvalidArgument (COLUMNS_MISMATCHED,
-  /// UNKNOWN_ENVIRONMENT, UNKNOWN_MICROPHONE, UNKNOWN_STRIKER, CONTACT_MALFORMED).
+  /// `step` must outlive the rows. Errors: InvalidArgument (CONTACT_MALFORMED,
+  /// PERFORMANCE_MALFORMED, UNKNOWN_STRIKER).
   static absl::StatusOr<PerformRows> Make(const v1::PerformStep& step, size_t environment_count,
                                           size_t microphone_count);
 

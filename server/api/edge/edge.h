@@ -54,7 +54,7 @@ class Edge {
   /// Binds the addresses, and prepares to serve these services and health. `refusing` answers the
   /// calls of connections without a place, of which WhyRefused tells the reason. The services must
   /// outlive this. Errors: InvalidArgument (INVALID_CONFIGURATION), FailedPrecondition
-  /// (TLS_REQUIRED, ACCESS_FILE_REQUIRED, TLS_UNUSABLE, LISTEN_FAILED, SOCKET_FOLDER_UNSAFE).
+  /// (TLS_REQUIRED, ACCESS_FILE_REQUIRED, TLS_UNUSABLE, LISTEN_FAILED).
   absl::Status Serve(absl::Span<grpc::Service* const> services,
                      grpc::CallbackGenericService& refusing);
 

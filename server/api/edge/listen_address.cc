@@ -67,7 +67,7 @@ absl::StatusOr<mode_t> SocketMode(const std::filesystem::path& folder) {
   const bool own = status.st_uid == geteuid() || status.st_uid == 0;
   const bool replaceable = (status.st_mode & 0022U) != 0 && (status.st_mode & S_ISVTX) == 0;
   if (own && !replaceable) return (status.st_mode & 0017U) == 0010U ? 0660 : 0600;
-  return Refusal(absl::StatusCode::kFailedPrecondition, "SOCKET_FOLDER_UNSAFE",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
                  absl::StrCat("other users could put a socket of theirs into \"", folder.string(),
                               own ? "\", which they may write to" : "\", which one of them owns",
                               ": name a folder of your own with --listen unix:PATH, or remove this "

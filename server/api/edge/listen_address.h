@@ -39,8 +39,8 @@ absl::Status CheckSocket(const std::string& path);
 
 /// Makes the folder of a Unix socket, for its owner only, unless it exists. Removes a socket that
 /// no running daemon serves. Returns the mode for the new socket, which is 0660 if only a group may
-/// enter the folder, and otherwise 0600. Errors: FailedPrecondition (LISTEN_FAILED,
-/// SOCKET_FOLDER_UNSAFE: another user owns the folder, or could replace the socket in it).
+/// enter the folder, and otherwise 0600. Errors: FailedPrecondition (LISTEN_FAILED: also
+/// if another user owns the folder, or could replace the socket in it).
 absl::StatusOr<mode_t> PrepareSocket(const std::string& path);
 
 }  // namespace carillon

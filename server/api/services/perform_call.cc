@@ -90,7 +90,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   absl::Status ForEach(const google::protobuf::RepeatedField<uint32_t>& indices, const Act& act) {
     for (const uint32_t index : indices) {
       if (index >= performance_->environment_count()) {
-        return Refusal(absl::StatusCode::kInvalidArgument, "UNKNOWN_ENVIRONMENT",
+        return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED",
                        absl::StrCat("environment ", index, " is unknown; the performance has ",
                                     performance_->environment_count(), ", counted from 0"));
       }

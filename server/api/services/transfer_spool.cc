@@ -35,7 +35,7 @@ absl::Status TransferSpool::Count(bool begins, size_t byte_count) {
     return absl::OkStatus();
   }
   return Refusal(
-      absl::StatusCode::kResourceExhausted, "TRANSFER_TOO_LARGE",
+      absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
       absl::StrCat("a model is imported with at most ", kMostTransfers, " transfers, of ",
                    kMostTransferBytes >> 20U, " MiB each and ", kMostBytes >> 20U,
                    " MiB together, ", kMostHeaderBytes >> 20U,

@@ -28,7 +28,7 @@ class TransferSpool {
   explicit TransferSpool(Database& database) : database_(&database) {}
 
   /// Appends a record of a transfer. A header begins the next transfer. Errors: InvalidArgument
-  /// (TRANSFER_MALFORMED), ResourceExhausted (TRANSFER_TOO_LARGE), and those of SpoolFile.
+  /// (TRANSFER_MALFORMED), ResourceExhausted (MODAL_MODEL_TOO_LARGE), and those of SpoolFile.
   absl::Status Append(const std::string& serialized);
 
   /// Calls `take` with each transfer, of which one at a time is in memory. Errors: those of

@@ -85,7 +85,7 @@ TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
     Put(beside, "live");
     fs::create_symlink(file_, folder_ / "link");
     for (const fs::path& path : {file_, folder_ / "link", fs::path(beside)}) {
-      EXPECT_THAT(Refused(path), HasSubstr("OUTPUT_IN_USE: " + path.string())) << companion;
+      EXPECT_THAT(Refused(path), HasSubstr("OUTPUT_NOT_WRITABLE: " + path.string())) << companion;
     }
     EXPECT_EQ(TextOf(file_) + TextOf(beside), "livelive");
     for (const fs::path& path : {fs::path(beside), folder_ / "link"}) fs::remove(path);
@@ -97,20 +97,20 @@ TEST_F(WholeFileTest, RefusesNamesThatTheDaemonRemoves) {
   const std::string unfinished = file_.string() + "-unfinished-backup-1";
   EXPECT_TRUE(WholeFile::Create(unfinished).ok());
   Put(file_, "live");
-  EXPECT_THAT(Refused(unfinished), HasSubstr("OUTPUT_IN_USE: "));
+  EXPECT_THAT(Refused(unfinished), HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 TEST_F(WholeFileTest, RefusesTheLockOfADataFolder) {
   EXPECT_TRUE(WholeFile::Create(folder_ / "lock").ok());
   Put(folder_ / "carillon.db", "live");
-  EXPECT_THAT(Refused(folder_ / "lock"), HasSubstr("OUTPUT_IN_USE: "));
+  EXPECT_THAT(Refused(folder_ / "lock"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 TEST_F(WholeFileTest, RefusesTheFolderWork) {
   fs::create_directory(folder_ / "work");
   EXPECT_TRUE(WholeFile::Create(folder_ / "work/copy.db").ok());
   Put(folder_ / "carillon.db", "live");
-  EXPECT_THAT(Refused(folder_ / "work/copy.db"), HasSubstr("OUTPUT_IN_USE: "));
+  EXPECT_THAT(Refused(folder_ / "work/copy.db"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
 }
 
 TEST_F(WholeFileTest, LeavesAFileInMemoryAsItIsUnlessItIsPublished) {
@@ -133,7 +133,7 @@ TEST_F(WholeFileTest, WritesAtOnceIntoAFileThatIsOpen) {
     EXPECT_EQ(TextOf(file_), expected += "a copy");
   }
   Put(file_.string() + "-wal", "live");
-  EXPECT_THAT(Refused(folder_ / "link"), HasSubstr("OUTPUT_IN_USE: "));
+  EXPECT_THAT(Refused(folder_ / "link"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
   EXPECT_EQ(TextOf(file_), expected);
   close(descriptor);
 }

@@ -137,7 +137,7 @@ TEST_F(GltfModelTest, WithoutIndicesAndMeshItIsIncomplete) {
                 Model(file).erase("indices");
                 file["nodes"][0].erase("mesh");
               }),
-              HasSubstr("MODEL_FILE_INCOMPLETE: "));
+              HasSubstr("MODEL_FILE_MALFORMED: "));
 }
 
 TEST_F(GltfModelTest, TheScaleOfTheNodeAndItsParentsIsTheSize) {
@@ -191,7 +191,7 @@ TEST_F(GltfModelTest, OfSeveralModelsOneIsPicked) {
 
 TEST_F(GltfModelTest, AMaterialThatTheFileLacksMustBeGiven) {
   const auto forget = [](json& file) { Model(file).erase("material"); };
-  EXPECT_THAT(Refused(forget), HasSubstr("MODEL_FILE_INCOMPLETE: "));
+  EXPECT_THAT(Refused(forget), HasSubstr("MODEL_FILE_MALFORMED: "));
   const auto read = ReadChanged(forget, "", SmallMaterial());
   ASSERT_TRUE(read.ok()) << read.status();
   ExpectNear(read->model.eigenvalues, model_.eigenvalues);
@@ -266,7 +266,7 @@ TEST_F(GltfModelTest, AFileWithoutModalModelsIsIncomplete) {
            [](json& file) { file.erase("extensions"); }, [](json& file) { file["extensions"] = 3; },
            [](json& file) { Extension(file)["modalModels"] = json::array(); },
            [](json& file) { Extension(file)["modalModels"] = "none"; }}) {
-    EXPECT_THAT(Refused(change), HasSubstr("MODEL_FILE_INCOMPLETE: "));
+    EXPECT_THAT(Refused(change), HasSubstr("MODEL_FILE_MALFORMED: "));
   }
 }
 

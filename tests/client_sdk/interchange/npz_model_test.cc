@@ -112,7 +112,7 @@ TEST_F(NpzModel, AModelWithoutWhatItNeedsIsIncomplete) {
   for (const size_t missing : {0U, 1U, 2U, 3U, 4U}) {
     std::vector<ZipEntry> entries = Least();
     entries.erase(entries.begin() + static_cast<ptrdiff_t>(missing));
-    EXPECT_THAT(Refused(entries), HasSubstr("MODEL_FILE_INCOMPLETE: ")) << missing;
+    EXPECT_THAT(Refused(entries), HasSubstr("MODEL_FILE_MALFORMED: ")) << missing;
   }
 }
 

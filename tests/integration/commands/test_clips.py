@@ -163,7 +163,7 @@ class ClipsTest(DaemonTest):
         (traces / "d.contacts").mkdir()
         (traces / "e.contacts").write_bytes(good)
         failed = self.run_ended(self.render(out, traces=traces), 1)
-        self.assertIn("CLIPS_FAILED: 3 clips", failed.stderr)
+        self.assertIn("SOME_FAILED: 3 clips", failed.stderr)
         lines = manifest(out)
         self.assertEqual([line["clip"] for line in lines], list("abcde"))
         self.assertEqual(["error" in line for line in lines], [False, True, True, True, False])
@@ -274,7 +274,7 @@ class ClipsTest(DaemonTest):
     def test_refusals(self):
         empty = self.new_folder()
         empty.mkdir(parents=True)
-        self.assertIn("NO_TRACES", self.run_ended(self.render(self.new_folder(), traces=empty), 1).stderr)
+        self.assertIn("FILE_NOT_FOUND", self.run_ended(self.render(self.new_folder(), traces=empty), 1).stderr)
         self.run_ended(self.render(self.new_folder(), "--shard", "0/3"), 2)
         self.run_ended(self.render(self.new_folder(), "--shard", "4/3"), 2)
         self.run_ended(self.render(self.new_folder(), "--workers", 9), 2)

@@ -196,7 +196,7 @@ class ReportTest(CommandLineTest):
         done = carillon("--server", self.daemon.server, "model", "create", *(self.folder / name for name in names),
                         "--material", meshes.MATERIAL, "--without-transfer", "--report", table)
         self.assertEqual(done.returncode, 1)
-        self.assertIn("MODELS_FAILED: 2 of 4 files", done.stderr)
+        self.assertIn("SOME_FAILED: 2 of 4 files", done.stderr)
         rows = [json.loads(line) for line in table.read_text().splitlines()]
         self.assertEqual([row["file"] for row in rows], [str(self.folder / name) for name in names])
         self.assertEqual([row["error"]["reason"] for row in rows[1::2]], ["MESH_EMPTY", "FILE_NOT_FOUND"])

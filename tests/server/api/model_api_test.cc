@@ -240,7 +240,7 @@ TEST_F(ModelApi, ManyTransfersOfAnImportAreRefused) {
   for (int i = 0; i < 65; ++i) {
     records.emplace_back().set_transfer(header.SerializeAsString());
   }
-  ExpectRefused(Import(records), grpc::RESOURCE_EXHAUSTED, "TRANSFER_TOO_LARGE");
+  ExpectRefused(Import(records), grpc::RESOURCE_EXHAUSTED, "MODAL_MODEL_TOO_LARGE");
 }
 
 TEST_F(ModelApi, AModelThatIsNotThereIsNotFound) {

@@ -244,7 +244,7 @@ TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
   EXPECT_EQ(last.accepted_count() + last.late_count(), 3U);
   EXPECT_EQ(last.dropped_count(), 0U);
   EXPECT_EQ(last.rejected_count(), 4U);
-  EXPECT_EQ(last.last_rejection().reason(), "COLUMNS_MISMATCHED");
+  EXPECT_EQ(last.last_rejection().reason(), "CONTACT_MALFORMED");
   EXPECT_DOUBLE_EQ(last.scheduling_delay_s(), 0.01 + 128 / 48000.0 + 0.005);
   EXPECT_DOUBLE_EQ(last.output_latency_s(), 8 * 128 / 48000.0);  // the null device adds none
 }

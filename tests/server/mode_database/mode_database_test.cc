@@ -196,7 +196,7 @@ TEST_F(ModeDatabaseTest, AFlippedBitInAMeshIsFoundWhenItIsWrittenOut) {
   ASSERT_TRUE(mesh.ok());
   FlipABitWithin("solid of revolution");
   EXPECT_THAT(database_->meshes().WriteFile(mesh->digest, folder_ / "mesh").ToString(),
-              HasSubstr("MESH_CORRUPT"));
+              HasSubstr("DATABASE_CORRUPT"));
 }
 
 TEST_F(ModeDatabaseTest, ANewerSchemaIsRefused) {

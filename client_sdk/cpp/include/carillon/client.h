@@ -253,7 +253,7 @@ class Client {
 
   /// Writes a consistent copy of the daemon's database to a file. A file that has the name already
   /// is replaced once the copy is complete; after an error it stays as it was.
-  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION (OUTPUT_IN_USE: the file
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION (the same: the file
   /// belongs to the database of a daemon), DATA_LOSS.
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 

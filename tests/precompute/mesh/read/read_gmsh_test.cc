@@ -150,7 +150,7 @@ TEST_F(ReadGmshTest, MidsideNodesInAnotherOrderAreRefused) {
   for (size_t e = 0; e < box.elements.size(); e += 10) {
     std::swap(box.elements[e + 8], box.elements[e + 9]);
   }
-  EXPECT_THAT(Refused(ToTextGmsh(box), "msh"), HasSubstr("MESH_MIDSIDE_NODE_MISPLACED: "));
+  EXPECT_THAT(Refused(ToTextGmsh(box), "msh"), HasSubstr("MESH_ELEMENT_INVERTED: "));
 }
 
 TEST_F(ReadGmshTest, PiecesThatDoNotHangTogetherAreRefused) {

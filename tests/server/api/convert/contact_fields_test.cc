@@ -132,7 +132,7 @@ TEST(Columns, AColumnOfAnotherLengthRejectsAllImpulsesAndIsNamed) {
     const Told told = Read(step);
     EXPECT_TRUE(told.impulses.empty());
     EXPECT_EQ(told.rejected_count, rejected_count) << name;
-    EXPECT_THAT(told.rejection, HasSubstr("COLUMNS_MISMATCHED: "));
+    EXPECT_THAT(told.rejection, HasSubstr("CONTACT_MALFORMED: "));
     EXPECT_THAT(told.rejection, HasSubstr(absl::StrCat("column ", name, " has")));
   };
   // Three contacts, two of them of two objects: both count.
@@ -157,7 +157,7 @@ TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
   step.mutable_poses()->add_orientation(0);
   const Told turned = Read(step);
   EXPECT_EQ(turned.rejected_count, 2U);
-  EXPECT_THAT(turned.rejection, HasSubstr("COLUMNS_MISMATCHED: the column orientation has 9"));
+  EXPECT_THAT(turned.rejection, HasSubstr("CONTACT_MALFORMED: the column orientation has 9"));
   step.mutable_poses()->add_position_m(0);
   EXPECT_THAT(Read(step).rejection, HasSubstr("the column position_m has 7"));
   step.mutable_poses()->clear_object();
@@ -213,15 +213,14 @@ TEST(Columns, WithTheVectorsOfAnotherKindAreRejected) {
   v1::ContactStep step = ThreeImpulses();
   v1::ContactColumns& columns = *step.mutable_contact_columns(0);
   columns.set_kind(v1::CONTACT_KIND_FORCE);
-  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: contact forces have"));
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: contact forces have"));
   columns.mutable_force_newtons()->Swap(columns.mutable_impulse_newton_seconds());
   EXPECT_TRUE(Validate(columns).ok());
   ObjectForce force;
   ReadRow(columns, 0, force);
   EXPECT_EQ(force.contact.impulse.impulse_newton_seconds, (Vector3{4, 5, 6}));
   columns.set_kind(v1::CONTACT_KIND_REPORTED);
-  EXPECT_THAT(Validate(columns).ToString(),
-              HasSubstr("COLUMNS_MISMATCHED: contacts with impulses"));
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: contacts with impulses"));
 }
 
 TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
@@ -242,7 +241,7 @@ TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
   EXPECT_EQ(touch.roughness.depth, 0.4);
   EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
   columns.mutable_partner()->RemoveLast();
-  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("COLUMNS_MISMATCHED: the column partner"));
+  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: the column partner"));
   v1::ContactStep step;
   *step.add_contact_columns() = columns;
   EXPECT_EQ(Read(step).rejected_count, 5U);  // three objects and two second ones

@@ -374,7 +374,7 @@ TEST_F(ConnectionGateTest, RefusesAFolderInWhichOthersCouldReplaceTheSocket) {
   ConnectionGate gate(1);
   ListenAddress address{.socket_path = folder / "socket", .host = ""};
   const absl::Status status = gate.Listen(address, std::make_unique<Keeper>(taken_));
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("SOCKET_FOLDER_UNSAFE: "));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("LISTEN_FAILED: "));
   ASSERT_EQ(chmod(folder.path().c_str(), 01777), 0);  // as /tmp has it
   EXPECT_TRUE(gate.Listen(address, std::make_unique<Keeper>(taken_)).ok());
 }

@@ -382,10 +382,10 @@ TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
       {.digest = digest_,
        .request = {},
        .way = 0,
-       .write_input = [](const auto&) { return absl::DataLossError("MESH_CORRUPT: x"); },
+       .write_input = [](const auto&) { return absl::DataLossError("DATABASE_CORRUPT: x"); },
        .on_progress = [](const v1::Progress&) {},
        .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});
-  EXPECT_EQ(ended.get_future().get().error.reason(), "MESH_CORRUPT");
+  EXPECT_EQ(ended.get_future().get().error.reason(), "DATABASE_CORRUPT");
 }
 
 TEST_F(LocalExecutorTest, MakesItsFolderAnewIfSomebodyHasRemovedIt) {
