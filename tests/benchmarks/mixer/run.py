@@ -23,7 +23,7 @@ import measuring
 import supercollider_peer
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-PARTS = ("ringing", "directed", "accuracy", "flood", "latency", "session")
+PARTS = ("ringing", "directed", "accuracy", "flood", "latency")
 
 
 def carillon(build, *arguments, most_target=None):
@@ -141,25 +141,6 @@ def latency(options, folder):
             measurement.stop()
 
 
-def session(options, folder):
-    use_integration_tests(options)
-    import session as sessions
-    print("\n## A session under a busy loop on each core and decompositions: JACK capture against the rendering of its "
-          "trace\n\n| seconds | impulses | late, dropped, merged or shed | real-time priority | xruns told by JACK; of "
-          "these, while a core of the machine stood still; frames lost | such standstills, longest ms | frames "
-          "compared | differing |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
-    played = sessions.Session(folder)
-    try:
-        found = played.run(options.session_seconds)
-    finally:
-        played.stop()
-    row(found["seconds"], found["accepted"], f"{found['late']}, {found['dropped']}, {found['merged_or_shed']}",
-        "yes" if found["realtime"] else "not allowed",
-        f"{found['xruns']}; {found['xruns_of_standstills']}; {found['lost_frames']}",
-        f"{found['standstills']}, {found['longest_standstill_ms']:.0f}",
-        f"{found['frames']:,}", found["differing_frames"])
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
@@ -171,13 +152,11 @@ def main():
     parser.add_argument("--flood-seconds", type=float, default=60)
     parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
                         help="STREAMSxSTRIKES: so many streams, and strikes in each")
-    parser.add_argument("--session-seconds", type=int, default=600)
     options = parser.parse_args()
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency,
-                   "session": session}
+            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency}
             run[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0
