@@ -111,20 +111,6 @@ class RefusalTest(DaemonTest):
         self.assertIn("warning: repaired: holes", ended.stderr)
         self.assertTrue(ended.stdout.startswith("modalModels/"), ended.stdout)
 
-    def test_by_the_decomposing_program_itself(self):
-        path = self.folder / "bad.obj"
-        for reason, data in BAD_MESHES.items():
-            with self.subTest(reason):
-                path.write_bytes(data)
-                ended = subprocess.run(
-                    [BIN / "carillon-precompute", path, "--out", self.folder / "no.model",
-                     "--material", meshes.MATERIAL, "--json"],
-                    capture_output=True, text=True, check=False)
-                self.assertNotEqual(ended.returncode, 0)
-                error = json.loads(ended.stdout)["error"]
-                self.assertEqual(error["reason"], reason)
-                self.assert_repairs(error["message"])
-
     def test_file_over_the_limit(self):
         piece = modal_model_service_pb2.UploadMeshRequest(data=bytes(strike.PIECE_BYTES))
         pieces = (piece for _ in range(MESH_LIMIT_BYTES // strike.PIECE_BYTES + 1))
