@@ -218,12 +218,6 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
 /// Renders a trace to a file. As JSON, `members` follow the summary.
 absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json,
                     std::vector<JsonMember> members = {});
-/// Renders the contact traces of a folder into another folder (ClipFolder). Clips that are there
-/// already stay. A trace that cannot be rendered does not stop the others. Errors: NotFound
-/// (FILE_NOT_FOUND), Internal (OUTPUT_NOT_WRITABLE), FailedPrecondition (SOME_FAILED), Cancelled
-/// (RENDERING_STOPPED: `stop` has arrived).
-absl::Status RenderClips(const client::Client& daemon, const RenderOptions& options,
-                         const StopSignal& stop, bool json);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Returns how the sound of a trace is written to the file `path`.
 RenderedForm FormOf(const RenderOptions& options, const std::string& path);

@@ -12,6 +12,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "client_sdk/cli/clips/clips_command.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/options/value_options.h"
 

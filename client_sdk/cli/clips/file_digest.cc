@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/commands/file_digest.h"
+#include "client_sdk/cli/clips/file_digest.h"
 
 #include <openssl/evp.h>
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // `carillon render FOLDER --out FOLDER`: the contact traces of a folder, several at a time.
+#include "client_sdk/cli/clips/clips_command.h"
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -15,10 +17,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/synchronization/mutex.h"
-#include "client_sdk/cli/commands/clip_folder.h"
-#include "client_sdk/cli/commands/clip_record.h"
-#include "client_sdk/cli/commands/commands.h"
-#include "client_sdk/cli/commands/file_digest.h"
+#include "client_sdk/cli/clips/clip_folder.h"
+#include "client_sdk/cli/clips/clip_record.h"
+#include "client_sdk/cli/clips/file_digest.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"

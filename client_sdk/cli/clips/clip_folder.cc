@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/commands/clip_folder.h"
+#include "client_sdk/cli/clips/clip_folder.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/commands/clip_record.h"
+#include "client_sdk/cli/clips/clip_record.h"
 
 #include <algorithm>
 #include <fstream>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client_sdk/cli/commands/file_digest.h"
+#include "client_sdk/cli/clips/file_digest.h"
 #include "client_sdk/cli/output/output.h"
 
 namespace carillon::cli {
