@@ -245,8 +245,6 @@ void Far(const SweepTargets& targets, const float* sources, int64_t source_count
   }
 }
 
-std::string Name() { return hwy::TargetName(HWY_TARGET); }
-
 }  // namespace carillon::precompute::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -256,7 +254,6 @@ namespace carillon::precompute {
 HWY_EXPORT(Left);
 HWY_EXPORT(Right);
 HWY_EXPORT(Far);
-HWY_EXPORT(Name);
 
 void SweepLeft(const SweepTargets& targets, const float* sources, int64_t source_count, int sides,
                int64_t begin, int64_t end, float* sums) {
@@ -272,8 +269,6 @@ void SweepFar(const SweepTargets& targets, const float* sources, int64_t source_
               int64_t begin, int64_t end, float* sums) {
   HWY_DYNAMIC_DISPATCH(Far)(targets, sources, source_count, begin, end, sums);
 }
-
-std::string SweepTargetName() { return HWY_DYNAMIC_DISPATCH(Name)(); }
 
 }  // namespace carillon::precompute
 #endif

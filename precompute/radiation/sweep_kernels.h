@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 namespace carillon::precompute {
@@ -59,9 +58,5 @@ void SweepRight(const SweepTargets& targets, const float* sources, int64_t sourc
 /// Sum q of direction i is number q * targets.padded() + i of `sums`.
 void SweepFar(const SweepTargets& targets, const float* sources, int64_t source_count,
               int64_t begin, int64_t end, float* sums);
-
-/// Returns the name of the instruction set that the sweeps use on this machine: "AVX3", "AVX2",
-/// "NEON", ...
-std::string SweepTargetName();
 
 }  // namespace carillon::precompute

@@ -5,7 +5,6 @@
 Each part prints a Markdown table:
   compare   SLEPc and Spectra on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
-  curved    CalculiX, SciPy and Lamb on curved ten-node meshes of Gmsh: frequencies
   growth    time and memory over the number of nodes, up to a million with --full
   estimates stated and true errors of every mode of twelve bodies, six of them with re-entrant corners, with the
             defaults and for accuracies of 3 % and 1 %
@@ -24,7 +23,6 @@ import tempfile
 
 import calculix
 import compare
-import curved
 import estimates
 import growth
 import packages
@@ -53,7 +51,6 @@ def fair_environment():
 
 
 PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
-         "curved": curved.curved,
          "growth": growth.growth,
          "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}
 

@@ -3,9 +3,8 @@
 """How the modes of four bodies radiate, what that costs, and how well the stated errors hold.
 
 Each part prints a Markdown table:
-  exact     spheres of every order to 6 against the closed form
   fork      levels round a tuning fork, near by and far away
-  dense     the equation solved by sweeps and GMRES beside its assembled matrix, factorized: spheres and the bodies
+  dense     one mode of each body, solved by sweeps and GMRES, beside its assembled matrix, factorized
   loudness  each body's modes: efficiency, decay by radiation, and by how many dB its pressure at 1 m differs from
             that of the paper's coupling
   errors    every --every-th mode, as computed with --goal, against itself on a surface with edges half as long:
@@ -139,9 +138,6 @@ def errors(options, folder):
 
 
 def dense(options, folder):
-    print("Spheres\n")
-    spheres("dense")(options, folder)
-    print("\nBodies: one mode by sweeps and GMRES, and on the same surface by its assembled matrix\n")
     print("| body | all modes, CPU s | modes | vertices | iterations | sweeps, CPU s | assembly, CPU s | LU, CPU s |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for name in options.only:
@@ -163,14 +159,11 @@ def cost(options, folder):
                   f"{found['cpu_seconds']:.1f} | {report['wall_s']:.1f} |", flush=True)
 
 
-def spheres(part):
-    def run(options, _):
-        subprocess.run([options.build / "tests/radiation_spheres", part], check=True)
-    return run
+def fork(options, _folder):
+    subprocess.run([options.build / "tests/radiation_fork"], check=True)
 
 
-PARTS = {"exact": spheres("exact"), "fork": spheres("fork"), "dense": dense, "loudness": loudness, "errors": errors,
-         "cost": cost}
+PARTS = {"fork": fork, "dense": dense, "loudness": loudness, "errors": errors, "cost": cost}
 
 
 def names(text):
