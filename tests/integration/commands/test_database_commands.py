@@ -183,7 +183,8 @@ class DatabaseCommandsTest(unittest.TestCase):
         for target in (data / "carillon.db", link, data / "carillon.db-wal", data / "carillon.db-shm"):
             refused = self.daemon.command("db", "backup", target, check=False)
             self.assertEqual(refused.returncode, 1, target)
-            self.assertRegex(refused.stderr, f"OUTPUT_NOT_WRITABLE: {target} belongs to the database of a daemon.*another")
+            self.assertRegex(refused.stderr,
+                             f"OUTPUT_NOT_WRITABLE: {target} belongs to the database of a daemon.*another")
         self.assertIn("bar", self.run_command("model", "list"))
         self.daemon.stop()
         self.assertEqual(self.offline("check").returncode, 0)
