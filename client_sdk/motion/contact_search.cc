@@ -23,7 +23,7 @@ ContactSearch::ContactSearch(const Motion& motion, const SearchBodies& bodies)
       bodies_(bodies),
       frames_(motion.frame_count()),
       bin_count_(
-          motion.frame_s < 0.6 * kBinS
+          motion.frames_are_steps || motion.frame_s < 0.6 * kBinS
               ? 1
               : static_cast<int>(std::clamp(std::round(motion.frame_s / kBinS), 2.0, 10.0))) {
   const size_t count = bodies.motions.size();
@@ -67,6 +67,7 @@ void ContactSearch::FindPairs() {
       pair.tolerance_m = TolerancesOf(one.radius_m(), two.radius_m());
       pair.reduced_mass_kg =
           1 / ((one.balanced() ? 1 / one.mass_kg() : 0) + (two.balanced() ? 1 / two.mass_kg() : 0));
+      pair.rounding_m = motion_.bodies[a].rounding_m + motion_.bodies[b].rounding_m;
       pair.friction = std::sqrt(motion_.bodies[a].friction * motion_.bodies[b].friction);
       pairs_.push_back(pair);
     }
@@ -79,7 +80,7 @@ bool ContactSearch::Near(const BodyPair& pair, size_t frame, double margin_m) co
   const auto apart = [&](const BodyPose& ball, const BodyPose& box, uint32_t of, uint32_t on) {
     const Vector centre = bodies_.motions[on].centre_m() +
                           box.orientation.conjugate() * (ball.position_m - box.position_m);
-    const double reach = bodies_.motions[of].radius_m() + margin_m;
+    const double reach = bodies_.motions[of].radius_m() + pair.rounding_m + margin_m;
     return bodies_.surfaces[on]->box().squaredExteriorDistance(centre) > reach * reach;
   };
   return !apart(a, b, pair.a, pair.b) && !apart(b, a, pair.b, pair.a);
@@ -107,6 +108,29 @@ PairPlacement ContactSearch::Place(const BodyPair& pair, size_t interval, double
   return {place(pair.a), place(pair.b)};
 }
 
+/// The features of both surfaces, moved outward by their rounding.
+std::vector<ContactFeature> ContactSearch::Features(const BodyPair& pair, const PairPlacement& at,
+                                                    double reach_m) const {
+  std::vector<ContactFeature> features =
+      FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b], at,
+                   reach_m + pair.rounding_m, 3 * pair.tolerance_m);
+  if (pair.rounding_m == 0) return features;
+  const auto in_scene = [](const BodyPose& pose, const Vector& point) {
+    return Vector(pose.position_m + pose.orientation * point);
+  };
+  for (ContactFeature& feature : features) {
+    const Vector apart = in_scene(at.a, feature.point_a) - in_scene(at.b, feature.point_b);
+    // Round corners and edges meet along the line between them.
+    if (feature.gap_m > 0.1 * pair.rounding_m) feature.normal = apart.normalized();
+    feature.gap_m -= pair.rounding_m;
+    feature.point_a -=
+        at.a.orientation.conjugate() * (motion_.bodies[pair.a].rounding_m * feature.normal);
+    feature.point_b +=
+        at.b.orientation.conjugate() * (motion_.bodies[pair.b].rounding_m * feature.normal);
+  }
+  return features;
+}
+
 void ContactSearch::FindAtFrames(size_t p, std::vector<PairFrame>& frames) const {
   const BodyPair& pair = pairs_[p];
   frames.resize(frames_);
@@ -120,8 +144,7 @@ void ContactSearch::FindAtFrames(size_t p, std::vector<PairFrame>& frames) const
     }
     const double reach = frame.slack_m + 4 * pair.tolerance_m;
     if (!Near(pair, k, reach)) continue;
-    frame.features = FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b],
-                                  Place(pair, k, 0, Path::kBetween), reach, 3 * pair.tolerance_m);
+    frame.features = Features(pair, Place(pair, k, 0, Path::kBetween), reach);
   }
 }
 
@@ -237,8 +260,7 @@ void ContactSearch::AddBlows(size_t p, const std::vector<PairFrame>& frames, boo
       for (const Path path : {Path::kBefore, Path::kBetween, Path::kAfter, Path::kKnown}) {
         if (known != (path == Path::kKnown)) continue;
         for (const ContactFeature& feature :
-             FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b],
-                          Place(pair, k, bin * bin_s, path), reach, 3 * tolerance)) {
+             Features(pair, Place(pair, k, bin * bin_s, path), reach)) {
           Candidate candidate{.pair = static_cast<uint32_t>(p),
                               .frame = static_cast<uint32_t>(k),
                               .last_frame = static_cast<uint32_t>(k),

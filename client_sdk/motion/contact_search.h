@@ -32,7 +32,8 @@ struct BodyPair {
   double tolerance_m = 0;
   double reduced_mass_kg = 0;
   double friction = 0;
-  double offset_m = 0;  ///< the gap at which the engine lets the pair rest
+  double rounding_m = 0;  ///< of both
+  double offset_m = 0;    ///< the gap at which the engine lets the pair rest
   double nearest_m = 1e300;
 };
 
@@ -70,6 +71,8 @@ class ContactSearch {
   void FindPairs();
   bool Near(const BodyPair& pair, size_t frame, double margin_m) const;
   double Slack(const BodyPair& pair, size_t interval) const;
+  std::vector<ContactFeature> Features(const BodyPair& pair, const PairPlacement& at,
+                                       double reach_m) const;
   PairPlacement Place(const BodyPair& pair, size_t interval, double time_s, Path path) const;
   bool Still(size_t body, size_t frame) const;
   bool Acts(size_t body, size_t node) const;

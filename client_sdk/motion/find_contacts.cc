@@ -92,7 +92,7 @@ std::optional<SearchBodies> Prepare(const Motion& motion) {
   SearchBodies bodies;
   bool moves = false;
   for (const MovingBody& body : motion.bodies) {
-    bodies.surfaces.push_back(std::make_unique<SurfaceIndex>(body.surface));
+    bodies.surfaces.push_back(std::make_unique<SurfaceIndex>(body.touching()));
     bodies.motions.emplace_back(body, motion);
     bodies.free_speed.push_back(FreeSpeed(bodies.motions.back(), motion));
     moves = moves || bodies.motions.back().balanced();
@@ -111,14 +111,15 @@ void SetNearest(const Motion& motion, const SearchBodies& bodies, Confidence& co
   double nearest = 1e300;
   for (size_t other = 0; other < motion.bodies.size(); ++other) {
     if (other == worst) continue;
-    for (const Vector& vertex : motion.bodies[worst].surface.vertices_m) {
+    for (const Vector& vertex : motion.bodies[worst].touching().vertices_m) {
       const Vector point =
           pose(other).orientation.conjugate() *
           (pose(worst).position_m + pose(worst).orientation * vertex - pose(other).position_m);
       const double far = std::min(nearest, bodies.surfaces[other]->box().exteriorDistance(point) +
                                                bodies.surfaces[other]->box().diagonal().norm());
       if (const auto at = bodies.surfaces[other]->Nearest(point, far)) {
-        nearest = std::min(nearest, std::abs(at->gap_m));
+        const double rounding_m = motion.bodies[worst].rounding_m + motion.bodies[other].rounding_m;
+        nearest = std::min(nearest, std::abs(at->gap_m - rounding_m));
       }
     }
   }

@@ -27,9 +27,10 @@ BodyMotion::BodyMotion(const MovingBody& body, const Motion& motion)
       gravity_(motion.gravity_m_per_s2),
       centre_m_(body.centre_of_mass_m),
       inertia_(body.mass_kg > 0 ? body.inertia_kg_m2 : Matrix(Matrix::Identity())) {
-  for (const Vector& vertex : body.surface.vertices_m) {
+  for (const Vector& vertex : body.touching().vertices_m) {
     radius_m_ = std::max(radius_m_, (vertex - centre_m_).norm());
   }
+  radius_m_ += body.rounding_m;
   for (const BodyPose& pose : body.poses) {
     const Turn turn = pose.orientation.normalized();
     places_.push_back({pose.position_m + turn * centre_m_, turn});

@@ -31,12 +31,18 @@ struct BodySurface {
 struct MovingBody {
   std::string name;
   BodySurface surface;
+  /// What the simulator collides in its place, if that is another one, and the radius by which the
+  /// simulator rounds it: contacts lie on a surface this much farther out.
+  BodySurface collider;
+  double rounding_m = 0;
   /// Zero: nothing is known of what moves the body, or it is fixed. Its momentum is not balanced.
   double mass_kg = 0;
   Vector centre_of_mass_m = Vector::Zero();  ///< in the body's frame
   Matrix inertia_kg_m2 = Matrix::Zero();     ///< about the centre of mass, in the body's axes
   double friction = 0.6;                     ///< a pair has the geometric mean of both
   std::vector<BodyPose> poses;               ///< one for each frame, or a single one: a fixed body
+
+  const BodySurface& touching() const { return collider.triangles.empty() ? surface : collider; }
 };
 
 /// What a joint leaves free.
@@ -55,6 +61,7 @@ struct Joint {
 struct Motion {
   double first_time_s = 0;
   double frame_s = 1.0 / 60;
+  bool frames_are_steps = false;  ///< of a simulator, whose impulses act at the frames alone
   Vector gravity_m_per_s2{0, 0, -9.81};
   std::vector<MovingBody> bodies;
   std::vector<Joint> joints;

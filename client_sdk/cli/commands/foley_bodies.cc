@@ -67,6 +67,9 @@ absl::Status CheckPatterns(const FoleyOptions& options, const motion::Motion& mo
   for (const std::string& pattern : options.driven) {
     RETURN_IF_ERROR(CheckPattern("--driven", pattern, motion));
   }
+  for (const std::string& pattern : options.repaired) {
+    RETURN_IF_ERROR(CheckPattern("--repair", pattern, motion));
+  }
   return absl::OkStatus();
 }
 
@@ -75,6 +78,10 @@ absl::StatusOr<double> NumberOf(const std::string& option, const BodyChoice& cho
   if (absl::SimpleAtod(choice.second, &number) && number > 0) return number;
   return Refused("INVALID_SETTINGS", absl::StrCat(option, " ", choice.first, "=", choice.second,
                                                   ": the number must be above zero"));
+}
+
+bool FitsAny(const std::vector<std::string>& patterns, const std::string& name) {
+  return std::ranges::any_of(patterns, [&](const auto& pattern) { return Fits(pattern, name); });
 }
 
 bool IsCatalogued(const std::string& name) {
@@ -110,6 +117,8 @@ absl::Status SetSurface(const FoleyOptions& options, MovingBody& body) {
 
 void Scale(double metres_per_unit, MovingBody& body) {
   for (Vector& vertex : body.surface.vertices_m) vertex *= metres_per_unit;
+  for (Vector& vertex : body.collider.vertices_m) vertex *= metres_per_unit;
+  body.rounding_m *= metres_per_unit;
   for (motion::BodyPose& pose : body.poses) pose.position_m *= metres_per_unit;
   body.centre_of_mass_m *= metres_per_unit;
   body.inertia_kg_m2 *= metres_per_unit * metres_per_unit;
@@ -117,11 +126,9 @@ void Scale(double metres_per_unit, MovingBody& body) {
 
 /// Sets mass, centre and inertia of a body that moves. Without a mass in the file it is that of the
 /// material; the inertia is that of a solid, as simulators take it.
-absl::Status SetMass(const FoleyOptions& options, const motion::SceneBody& given,
-                     const FoleyBody& sounds, MovingBody& body) {
-  const bool driven = given.driven || std::ranges::any_of(options.driven, [&](const auto& pattern) {
-                        return Fits(pattern, body.name);
-                      });
+absl::Status SetMass(const FoleyOptions& options, const motion::SceneBody& given, FoleyBody& sounds,
+                     MovingBody& body) {
+  const bool driven = given.driven || FitsAny(options.driven, body.name);
   body.mass_kg = 0;
   if (driven || body.poses.size() < 2) return absl::OkStatus();
   const motion::SolidMeasures solid = motion::Measure(body.surface);
@@ -129,13 +136,15 @@ absl::Status SetMass(const FoleyOptions& options, const motion::SceneBody& given
   if (const auto mass = Chosen(options.masses, body.name)) {
     ASSIGN_OR_RETURN(body.mass_kg, NumberOf("--mass", {body.name, *mass}));
   }
-  if (body.mass_kg == 0 && !sounds.material.empty()) {
+  if (!sounds.material.empty()) {
     v1::Material material;
     material.set_preset(sounds.material);
     ASSIGN_OR_RETURN(material, ResolveMaterial(material));
     const double shell_m3 = sounds.wall_m > 0 ? solid.area_m2 * sounds.wall_m : solid.volume_m3;
-    body.mass_kg = material.density_kg_per_m3() * std::min(shell_m3, solid.volume_m3);
+    sounds.material_mass_kg =
+        material.density_kg_per_m3() * std::max(0.0, std::min(shell_m3, solid.volume_m3));
   }
+  if (body.mass_kg == 0) body.mass_kg = sounds.material_mass_kg;
   if (body.mass_kg == 0) return absl::OkStatus();
   if (!(solid.volume_m3 > 0) && !given.has_inertia) {
     return Refused("SURFACE_OPEN", absl::StrCat(body.name,
@@ -176,6 +185,7 @@ absl::Status SetBody(const FoleyOptions& options, const motion::SceneBody& given
     ASSIGN_OR_RETURN(sounds.wall_m, NumberOf("--wall", {body.name, *wall}));
   }
   sounds.closed = motion::IsClosed(body.surface);
+  sounds.repair = !sounds.closed && (options.force || FitsAny(options.repaired, body.name));
   return SetMass(options, given, sounds, body);
 }
 
@@ -188,6 +198,7 @@ absl::StatusOr<FoleyScene> ReadFoleyScene(const FoleyOptions& options) {
   ASSIGN_OR_RETURN(foley.scene, is_gltf ? motion::ReadGltfMotion(options.file, options.force)
                                         : motion::ReadPoseTable(options.file));
   motion::Motion& motion = foley.scene.motion;
+  motion.frames_are_steps = options.frames_are_steps;
   if (options.gravity_m_per_s2) {
     const auto& g = *options.gravity_m_per_s2;
     motion.gravity_m_per_s2 = {g[0], g[1], g[2]};

@@ -15,6 +15,8 @@ struct FoleyBody {
   std::string material;  ///< empty: silent
   double wall_m = 0;     ///< zero: solid
   bool closed = false;
+  bool repair = false;
+  double material_mass_kg = 0;  ///< by material, volume and wall; zero: unknown
 };
 
 /// A motion with all that the command line says of it.

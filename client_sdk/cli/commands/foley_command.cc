@@ -53,17 +53,18 @@ void List(const FoleyScene& foley) {
   }
 }
 
-absl::Status CheckSounds(const FoleyScene& foley, bool force) {
+absl::Status CheckSounds(const FoleyScene& foley) {
   bool sounds = false;
   for (size_t i = 0; i < foley.bodies.size(); ++i) {
     if (foley.bodies[i].material.empty()) continue;
     sounds = true;
-    if (foley.bodies[i].closed || force) continue;
-    return Refusal(absl::StatusCode::kInvalidArgument, "SURFACE_OPEN",
-                   absl::StrCat(foley.scene.motion.bodies[i].name,
-                                " is not closed: close its surface, or repair it by --force, or "
-                                "keep it silent by --material '",
-                                foley.scene.motion.bodies[i].name, "=none'"));
+    if (foley.bodies[i].closed || foley.bodies[i].repair) continue;
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "SURFACE_OPEN",
+        absl::StrCat(foley.scene.motion.bodies[i].name,
+                     " is not closed: close its surface, or repair it by --repair '",
+                     foley.scene.motion.bodies[i].name, "', or keep it silent by --material '",
+                     foley.scene.motion.bodies[i].name, "=none'"));
   }
   if (sounds) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
@@ -107,10 +108,29 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
                    "bodies that are moved by hand (--driven); --force renders all the same"));
 }
 
+/// Scales impulses and forces of each pair by its reduced mass, from the masses of the simulation
+/// to those of the materials: the speeds are seen, and the masses of a simulation often are not
+/// meant.
+void WeighByMaterial(const FoleyScene& foley, motion::FoundContacts& found) {
+  const auto factor = [&](const motion::ContactPoint& contact) {
+    double simulated = 0, meant = 0;  // sums of 1 / m
+    for (const uint32_t body : {contact.a, contact.b}) {
+      const double mass_kg = foley.scene.motion.bodies[body].mass_kg;
+      if (mass_kg == 0) continue;
+      const double by_material_kg = foley.bodies[body].material_mass_kg;
+      simulated += 1 / mass_kg;
+      meant += 1 / (by_material_kg > 0 ? by_material_kg : mass_kg);
+    }
+    return meant > 0 ? simulated / meant : 1;
+  };
+  for (motion::FoundBlow& blow : found.blows) blow.impulse_newton_seconds *= factor(blow);
+  for (motion::FoundLoad& load : found.loads) load.force_newtons *= factor(load);
+}
+
 /// Makes the models of the bodies that sound; bodies of one surface and material share one.
 class FoleyModels {
  public:
-  FoleyModels(const client::Client& daemon, bool repair) : daemon_(daemon), repair_(repair) {}
+  explicit FoleyModels(const client::Client& daemon) : daemon_(daemon) {}
 
   absl::Status Request(const MovingBody& body, const FoleyBody& sounds) {
     const std::string obj = motion::ObjText(body.surface);
@@ -124,7 +144,7 @@ class FoleyModels {
     request.set_mesh_format("obj");
     request.mutable_material()->set_preset(sounds.material);
     request.mutable_settings()->mutable_mesh()->set_wall_m(sounds.wall_m);
-    request.mutable_settings()->mutable_mesh()->set_repair(repair_ && !sounds.closed);
+    request.mutable_settings()->mutable_mesh()->set_repair(sounds.repair);
     request.set_size(1);
     request.set_min_frequency_hz(20);
     request.set_label(body.name);
@@ -142,7 +162,6 @@ class FoleyModels {
 
  private:
   const client::Client& daemon_;
-  bool repair_;
   std::map<const MovingBody*, std::string> keys_;
   std::map<std::string, v1::Job> jobs_;
 };
@@ -199,7 +218,7 @@ absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOp
     trace.header.mutable_hearing()->set_panning(options.sound.channel_count > 1);
     Set(*trace.header.mutable_listener(), listener->poses.front());
   }
-  FoleyModels models(daemon, options.force);
+  FoleyModels models(daemon);
   motion::StepSettings settings{.handles = std::vector<uint32_t>(motion.bodies.size(), 0),
                                 .silent_striker = options.silent_striker,
                                 .roughness_depth = options.roughness_depth};
@@ -255,10 +274,11 @@ absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
     List(foley);
     return absl::OkStatus();
   }
-  RETURN_IF_ERROR(CheckSounds(foley, options.force));
-  ASSIGN_OR_RETURN(const motion::FoundContacts found,
+  RETURN_IF_ERROR(CheckSounds(foley));
+  ASSIGN_OR_RETURN(motion::FoundContacts found,
                    motion::FindContacts(foley.scene.motion, options.force));
   RETURN_IF_ERROR(Judge(foley.scene.motion, found, options.force));
+  if (options.material_masses) WeighByMaterial(foley, found);
   const auto daemon = program.Daemon();
   ASSIGN_OR_RETURN(const FoleyTrace trace, MakeTrace(*daemon, options, foley, found));
   const std::string temporary =

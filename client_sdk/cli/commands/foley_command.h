@@ -20,7 +20,7 @@ using BodyChoice = std::pair<std::string, std::string>;
 struct FoleyOptions {
   std::string file;
   std::vector<BodyChoice> materials, meshes, walls, masses;
-  std::vector<std::string> driven;
+  std::vector<std::string> driven, repaired;
   std::optional<double> floor_m;  ///< height of an endless floor against gravity
   std::optional<std::array<double, 3>> gravity_m_per_s2;
   double metres_per_unit = 1;
@@ -31,6 +31,9 @@ struct FoleyOptions {
   std::string trace;     ///< the contact trace to keep
   std::string stems;     ///< a folder for the sound of each body alone
   bool list = false, force = false;
+  bool frames_are_steps = false;
+  /// Impulses are scaled to the masses that the materials give.
+  bool material_masses = false;
   RenderOptions sound;  ///< `trace` is not used
 };
 

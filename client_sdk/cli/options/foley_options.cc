@@ -51,6 +51,13 @@ void AddBodies(CLI::App& foley, FoleyOptions& options) {
       .add_option("--driven", options.driven,
                   "Bodies that are moved by hand, and not by contacts: a PATTERN")
       ->group("Bodies");
+  foley.add_option("--repair", options.repaired, "Bodies whose surface is to be closed: a PATTERN")
+      ->group("Bodies");
+  foley
+      .add_flag("--material-masses", options.material_masses,
+                "Scale impulses to the masses that the materials give, where those of the "
+                "simulation were not meant")
+      ->group("Bodies");
 }
 
 void AddWorld(CLI::App& foley, FoleyOptions& options) {
@@ -74,6 +81,8 @@ void AddWorld(CLI::App& foley, FoleyOptions& options) {
                   "The unit of length of the file: m, cm, mm [m]")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, double>{{"m", 1}, {"cm", 0.01}, {"mm", 0.001}}));
+  foley.add_flag("--frames-are-steps", options.frames_are_steps,
+                 "Each frame is a step of the simulator, so that blows act at frames alone");
   TakeWithin(
       *foley.add_option("--friction", options.friction,
                         "The coefficient of friction of all bodies [that of the file, or 0.6]"),

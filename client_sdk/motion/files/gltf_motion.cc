@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client_sdk/motion/files/gltf_physics.h"
 #include "client_sdk/motion/files/motion_scene.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/gltf/gltf_document.h"
@@ -25,13 +26,6 @@ using nlohmann::json;
 struct MotionFault {
   std::string reason, what;
 };
-
-const json& Member(const json& object, const char* key) {
-  static const json none;
-  if (!object.is_object()) return none;
-  const auto at = object.find(key);
-  return at == object.end() ? none : *at;
-}
 
 /// How one property of a node changes.
 struct Channel {
@@ -283,28 +277,16 @@ class MotionReader {
     body.name = name;
     body.poses = PosesOf(node);
     const Turn back = body.poses[0].orientation.conjugate();
-    // Exporters give a corner once for each of its normals: corners at one place are one.
-    std::map<std::array<double, 3>, uint32_t> seen;
-    for (const GltfSurface& surface : ReadPlacedMesh(document_, node, worlds_[0])) {
-      std::vector<uint32_t> index;
-      for (const GltfPoint& p : surface.points) {
-        const auto [at, is_new] =
-            seen.try_emplace(p, static_cast<uint32_t>(body.surface.vertices_m.size()));
-        if (is_new) {
-          body.surface.vertices_m.push_back(back *
-                                            (Vector(p[0], p[1], p[2]) - body.poses[0].position_m));
-        }
-        index.push_back(at->second);
+    for (GltfSurface& surface : ReadPlacedMesh(document_, node, worlds_[0])) {
+      for (GltfPoint& p : surface.points) {
+        const Vector point = back * (Vector(p[0], p[1], p[2]) - body.poses[0].position_m);
+        p = {point.x(), point.y(), point.z()};
       }
-      for (size_t i = 0; i + 2 < surface.corners.size(); i += 3) {
-        const std::array<uint32_t, 3> t = {index[surface.corners[i]], index[surface.corners[i + 1]],
-                                           index[surface.corners[i + 2]]};
-        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) body.surface.triangles.push_back(t);
-      }
+      AddSurface(surface, body.surface);
     }
     if (body.surface.triangles.empty()) throw GltfFault(absl::StrCat(name, " has no triangle"));
     about.material = MaterialOf(json_node);
-    ReadPhysics(json_node, body, about);
+    ReadGltfPhysics(document_, json_node, worlds_[0][node], body, about);
   }
 
   std::string MaterialOf(const json& node) const {
@@ -315,49 +297,6 @@ class MotionReader {
       if (name.is_string()) return name.get<std::string>();
     }
     return "";
-  }
-
-  static std::optional<Vector> VectorOf(const json& list) {
-    if (!list.is_array() || list.size() != 3) return std::nullopt;
-    return Vector(list[0].get<double>(), list[1].get<double>(), list[2].get<double>());
-  }
-
-  void ReadPhysics(const json& node, MovingBody& body, SceneBody& about) const {
-    const json& extensions = Member(node, "extensions");
-    const json& khronos = Member(extensions, "KHR_physics_rigid_bodies");
-    const json& omi = Member(extensions, "OMI_physics_body");
-    const json& khronos_motion = Member(khronos, "motion");
-    const json& motion = khronos_motion.is_object()          ? khronos_motion
-                         : Member(omi, "motion").is_object() ? Member(omi, "motion")
-                                                             : omi;
-    if (motion.is_object()) {
-      about.driven = motion.value("isKinematic", false) || motion.value("type", "") == "kinematic";
-      about.mass_kg = motion.value("mass", 0.0);
-      if (const auto centre = VectorOf(Member(motion, "centerOfMass"))) {
-        about.has_centre = true;
-        body.centre_of_mass_m = *centre;
-      }
-      const auto moments = VectorOf(Member(motion, "inertiaDiagonal"));
-      if (moments && moments->minCoeff() > 0) {
-        Turn axes = Turn::Identity();
-        const json& turn = Member(motion, "inertiaOrientation");
-        if (turn.is_array() && turn.size() == 4) {
-          axes = Turn(turn[3].get<double>(), turn[0].get<double>(), turn[1].get<double>(),
-                      turn[2].get<double>())
-                     .normalized();
-        }
-        about.has_inertia = true;
-        body.inertia_kg_m2 =
-            axes.toRotationMatrix() * moments->asDiagonal() * axes.toRotationMatrix().transpose();
-      }
-    }
-    const json& material = Member(Member(khronos, "collider"), "physicsMaterial");
-    const json& all =
-        Member(Member(Member(document_.root(), "extensions"), "KHR_physics_rigid_bodies"),
-               "physicsMaterials");
-    if (material.is_number_unsigned() && all.is_array() && material.get<size_t>() < all.size()) {
-      body.friction = 1.2 * all[material.get<size_t>()].value("dynamicFriction", 0.5);
-    }
   }
 
   const GltfDocument& document_;

@@ -43,7 +43,8 @@ def write_obj(path, vertices, triangles):
                     + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles))
 
 
-def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel"):
+def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel", drawn=SIDES_M,
+               collider=None):
     """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z."""
     blob, views, accessors = b"", [], []
 
@@ -68,10 +69,13 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
         bar["skin"] = 0
     if mass:
         bar["extensions"] = {"KHR_physics_rigid_bodies": {"motion": {"mass": mass}}}
+    if collider:
+        bar["extensions"]["KHR_physics_rigid_bodies"]["collider"] = {"geometry": {"mesh": 2},
+                                                                     "extras": {"rounding": collider[1]}}
     gltf = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
         "materials": [{"name": material}, {"name": "Ground"}],
-        "meshes": [mesh(SIDES_M, 0), mesh((4, 0.2, 4), 1)],
+        "meshes": [mesh(drawn, 0), mesh((4, 0.2, 4), 1)],
         # The bar's own z, along which it falls, is the scene's y.
         "nodes": [{"name": "Turned", "rotation": [-half, 0, 0, half], "children": [1]}, bar,
                   {"name": "Ground", "mesh": 1, "translation": [0, -0.1, 0]},
@@ -81,6 +85,8 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
                                       "output": accessor([(0, 0, z) for z in height[keys]], "VEC3", 5126)}],
                         "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}],
         "bufferViews": views, "accessors": accessors}
+    if collider:
+        gltf["meshes"].append(mesh(collider[0], 0))
     if skin:
         gltf["skins"] = [{"joints": [2]}]
     gltf["buffers"] = [{"byteLength": len(blob)}]
@@ -148,6 +154,24 @@ class FoleyTest(DaemonTest):
         trace = self.folder / "heavy.contacts"
         self.foley("heavy.glb", "--trace", trace)
         self.check_impacts(trace, 2 * IMPULSE_N_S)
+        self.foley("heavy.glb", "--trace", trace, "--material-masses")
+        self.check_impacts(trace)
+
+    def test_a_collider_that_the_simulator_rounds_touches_in_place_of_the_mesh(self):
+        # What is seen is smaller than what touches, by the same 2 mm on all sides.
+        write_gltf(self.folder / "round.glb", drawn=tuple(side - 0.004 for side in SIDES_M), mass=MASS_KG,
+                   collider=(tuple(side - 0.006 for side in SIDES_M), 0.003))
+        trace = self.folder / "round.contacts"
+        self.foley("round.glb", "--trace", trace)
+        self.check_impacts(trace)
+
+    def test_an_open_surface_is_repaired_where_it_is_asked_for(self):
+        vertices, triangles = box(SIDES_M)
+        write_obj(self.folder / "hole.obj", vertices, triangles[1:])
+        out = self.folder / "hole.wav"
+        self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'hole.obj'}", "--material",
+                   "Bar=structural_steel", "--repair", "B*", "--out", out, "--tail", 0.1)
+        self.assertGreater(numpy.abs(sound.read_wave(out)).max(), 1e-4)
 
     def test_list_shows_bodies_and_cameras(self):
         lines = self.foley("fall.glb", "--list").stdout
