@@ -5,8 +5,9 @@
 #
 # Builds the release preset and makes Debian packages of it in FOLDER, by default build/packages, which apt can use as
 # a repository, with the archive of the source that belongs to them. VERSION is that of CMakeLists.txt unless it is
-# given. lintian checks the packages of the project's own version, and its errors fail the script. With --built, the
-# programs are taken from the folder BUILD as they are, and no package is installed for building them.
+# given. The add-on for Blender comes as a zip, too. lintian checks the packages of the project's own version, and its
+# errors fail the script. With --built, the programs are taken from the folder BUILD as they are, and no package is
+# installed for building them.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
@@ -57,7 +58,10 @@ dpkg-buildpackage --build=binary --no-sign --no-check-builddeps >"$scratch/log" 
 }
 [[ $version != "$own_version" ]] || lintian --fail-on error --tag-display-limit 0 "$scratch"/*.deb
 cp "$scratch"/*.deb "$folder"
+cp -r "$source/client_sdk/blender" "$scratch/carillon_blender"
+(cd "$scratch" && python3 -m zipfile -c "$folder/carillon_blender-$version.zip" carillon_blender)
 # The index lets apt use the folder as a repository.
 (cd "$folder" && dpkg-scanpackages --multiversion . >Packages 2>/dev/null)
-printf 'package: %s\n' "$folder"/*_"$version"_*.deb "$folder/carillon_$version.tar.xz"
+printf 'package: %s\n' "$folder"/*_"$version"_*.deb "$folder/carillon_$version.tar.xz" \
+  "$folder/carillon_blender-$version.zip"
 printf 'apt: echo "deb [trusted=yes] file:%s ./" > /etc/apt/sources.list.d/carillon.list\n' "$folder"

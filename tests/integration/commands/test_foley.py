@@ -201,6 +201,11 @@ class FoleyTest(DaemonTest):
         write_obj(self.folder / "open.obj", vertices, triangles[1:])
         self.refused("SURFACE_OPEN", self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'open.obj'}",
                                                 "--material", "Bar=structural_steel", *out, check=False))
+        write_obj(self.folder / "small.obj", *box((0.012, 0.012, SIDES_M[2])))
+        silent = self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'small.obj'}", "--material",
+                            "Bar=structural_steel", *out, check=False)
+        self.refused("NO_MODE_IN_BAND", silent)
+        self.assertRegex(silent.stderr, "(?m)^Bar .* failed$")
         self.assertFalse((self.folder / "none.contacts").exists())
         self.table("fall.csv", "--force", *out)
         self.assertEqual(impacts(self.folder / "none.contacts"), [])

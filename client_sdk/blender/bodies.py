@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bodies of a scene: which objects take part, their surfaces as evaluated, and what the simulation knows of
+them."""
+
+import dataclasses
+
+import numpy
+
+from . import settings, shapes
+from .programs import Fault
+
+
+@dataclasses.dataclass
+class Body:
+    """A body in its own frame, whose axes are the object's and whose origin is the object's: there the simulator has
+    the centre of mass. Lengths are metres."""
+    name: str
+    vertices: numpy.ndarray
+    triangles: numpy.ndarray
+    material: str            # as the Blender material says, or empty
+    friction: float = 0.5
+    mass: float = 0          # of the simulation, kg; 0: not simulated
+    inertia: numpy.ndarray = None  # kg m^2, about the object's axes
+    collider: numpy.ndarray = None  # triangles (M, 3, 3) that the simulator collides, if they are others
+    rounding: float = 0      # of the collider
+    driven: bool = False     # moved by something else than contacts
+
+
+def in_world(scene):
+    """The rigid bodies of the scene's simulation."""
+    world = scene.rigidbody_world
+    if world is None or not world.enabled or world.collection is None:
+        return []
+    return [obj for obj in world.collection.objects if obj.rigid_body and obj.type == 'MESH']
+
+
+def is_part(obj):
+    """True for a child whose shape belongs to its parent's body."""
+    parent = obj.parent
+    return bool(parent and parent.rigid_body and parent.rigid_body.collision_shape == 'COMPOUND' and obj.rigid_body)
+
+
+def is_free(obj):
+    """True if the simulation moves the object, at least at times."""
+    body = obj.rigid_body
+    keyed = obj.animation_data and obj.animation_data.action and any(
+        curve.data_path == "rigid_body.kinematic" for curve in obj.animation_data.action.fcurves)
+    return body.type == 'ACTIVE' and body.enabled and (not body.kinematic or bool(keyed))
+
+
+def taking_part(scene):
+    """The objects that are bodies: all rigid bodies, and others for which a material is chosen."""
+    rigid = [obj for obj in in_world(scene) if not is_part(obj)]
+    others = [obj for obj in scene.objects
+              if obj.type == 'MESH' and obj.carillon.material and obj not in rigid and not is_part(obj)]
+    return sorted(rigid + others, key=lambda obj: obj.name)
+
+
+def rotation(matrices):
+    """The rotations (..., 3, 3) of matrices whose columns are scaled, and may be mirrored or sheared."""
+    linear = numpy.asarray(matrices, float)[..., :3, :3]
+    left, _, right = numpy.linalg.svd(linear / numpy.linalg.norm(linear, axis=-2, keepdims=True))
+    left[..., 2] *= numpy.sign(numpy.linalg.det(left @ right))[..., None]
+    return left @ right
+
+
+def split(matrices):
+    """Positions (F, 3) and orientations w, x, y, z (F, 4) of world matrices (F, 4, 4). Of q and -q it takes the one
+    nearer to the orientation before."""
+    r = numpy.moveaxis(rotation(matrices), 0, -1)
+    a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    d, e, f = r[1, 0] + r[0, 1], r[0, 2] + r[2, 0], r[2, 1] + r[1, 2]
+    squares = numpy.stack([1 + r[0, 0] + r[1, 1] + r[2, 2], 1 + r[0, 0] - r[1, 1] - r[2, 2],
+                           1 - r[0, 0] + r[1, 1] - r[2, 2], 1 - r[0, 0] - r[1, 1] + r[2, 2]])
+    s = squares
+    rows = numpy.array([[s[0], a, b, c], [a, s[1], d, e], [b, d, s[2], f], [c, e, f, s[3]]])
+    # Of the four rows, which are multiples of each other, that of the largest component loses no digits.
+    turns = rows[squares.argmax(0), :, numpy.arange(rows.shape[2])]
+    turns /= numpy.linalg.norm(turns, axis=1, keepdims=True)
+    signs = numpy.where((turns[1:] * turns[:-1]).sum(1) < 0, -1, 1)
+    turns[1:] *= numpy.cumprod(signs)[:, None]
+    return numpy.asarray(matrices, float)[:, :3, 3], turns
+
+
+def _surface(obj):
+    """Vertices (N, 3) and triangles (M, 3) of an object in its own frame, with its modifiers if it is evaluated."""
+    mesh = obj.to_mesh()
+    mesh.calc_loop_triangles()
+    vertices = numpy.empty(3 * len(mesh.vertices), numpy.float32)
+    mesh.vertices.foreach_get("co", vertices)
+    triangles = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    obj.to_mesh_clear()
+    return vertices.reshape(-1, 3).astype(float), triangles.reshape(-1, 3)
+
+
+def _placed(obj, depsgraph, back):
+    """The surface in the frame that `back` leads to from the world; a mirrored one is turned inside out again."""
+    vertices, triangles = _surface(obj.evaluated_get(depsgraph))
+    matrix = back @ numpy.asarray(obj.matrix_world, float)
+    if numpy.linalg.det(matrix[:3, :3]) < 0:
+        triangles = triangles[:, ::-1]
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], triangles
+
+
+def _read_simulated(body, obj, depsgraph, scale):
+    """Sets what the simulation has of a rigid body. Its shape is of the mesh before modifiers, unless its source is the
+    final one."""
+    rigid = obj.rigid_body
+    of = obj.evaluated_get(depsgraph) if rigid.mesh_source == 'FINAL' else obj
+    vertices, triangles = _surface(of)
+    body.friction = rigid.friction
+    if rigid.collision_shape != 'COMPOUND':
+        own_scale = numpy.linalg.norm(numpy.asarray(obj.matrix_world, float)[:3, :3], axis=0)
+        body.collider, rounding = shapes.collider(rigid, vertices, triangles, own_scale)
+        body.rounding = scale * rounding
+        body.collider = None if body.collider is None else scale * body.collider
+    if is_free(obj):
+        body.mass = rigid.mass
+        body.inertia = scale ** 2 * shapes.moments(rigid, vertices)
+
+
+def read(obj, scene, depsgraph, moves, simulated):
+    """The body of an object at the frame of `depsgraph`."""
+    scale = settings.metres_per_unit(scene)
+    back = numpy.eye(4)
+    back[:3, :3] = rotation(obj.matrix_world).T
+    back[:3, 3] = -back[:3, :3] @ numpy.asarray(obj.matrix_world, float)[:3, 3]
+    parts = [obj] + [child for child in obj.children_recursive if child.type == 'MESH' and is_part(child)]
+    if len(parts) > 1:
+        parts = parts[1:]  # a compound shape is that of its children
+    vertices, triangles = zip(*(_placed(part, depsgraph, back) for part in parts))
+    first = numpy.cumsum([0, *map(len, vertices)])
+    body = Body(obj.name, scale * numpy.concatenate(vertices),
+                numpy.concatenate([part + at for part, at in zip(triangles, first)]), settings.guessed_material(obj))
+    if not len(body.triangles):
+        raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", obj.name)
+    rigid = obj.rigid_body
+    if rigid and simulated:
+        _read_simulated(body, obj, depsgraph, scale)
+    if not body.mass:
+        body.driven = moves and (simulated or obj.carillon.material == "none")
+    return body

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The motion of a scene: the bodies, and their poses and the camera's from the first frame to the last."""
+
+import dataclasses
+
+import bpy
+import numpy
+
+from . import bodies, rebake, settings
+from .gltf import GltfWriter
+from .programs import Fault
+
+# A simulation that keyed bodies disturb may differ by this much from the one that was seen, m.
+ALIKE_M = 1e-3
+
+
+@dataclasses.dataclass
+class Motion:
+    bodies: list
+    matrices: numpy.ndarray  # of the bodies, and of the camera as the last (B + 1, F, 4, 4)
+    frames_per_s: float
+    how: str                 # what the poses are, as text
+    steps: bool = False      # each frame is a step of the simulation
+
+    def write(self, path, scene):
+        scale = settings.metres_per_unit(scene)
+        writer = GltfWriter(numpy.arange(self.matrices.shape[1]) / self.frames_per_s)
+        placed = [bodies.split(matrices) for matrices in self.matrices]
+        for body, (positions, turns) in zip(self.bodies, placed):
+            writer.add_body(body, scale * positions, turns)
+        if scene.camera:
+            writer.add_camera("camera", scale * placed[-1][0], placed[-1][1])
+        writer.write(path)
+
+
+def read(scene, tell):
+    """Reads the motion of a scene, which is a copy and is changed. Calls tell(share, text) at each stage."""
+    if scene.render.frame_map_old != scene.render.frame_map_new:
+        raise Fault("TIME_REMAPPED", "the scene's time is remapped (Output > Frame Range > Time Stretching): set Old "
+                                     "and New alike")
+    objects = bodies.taking_part(scene)
+    if not objects:
+        raise Fault("NO_BODY", f"{scene.name} has no rigid body, and no object has a material of Carillon: give the "
+                               "objects that sound a material, and their floor the material none")
+    free = [obj for obj in objects if obj in bodies.in_world(scene) and bodies.is_free(obj)]
+    tell(0.05, "Reading the animation")
+    return _read_simulated(scene, objects, free, tell) if free else _read_keyed(scene, objects)
+
+
+def _surfaces(scene, objects, matrices, simulated):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return [bodies.read(obj, scene, depsgraph, _moves(m), simulated) for obj, m in zip(objects, matrices)]
+
+
+def _moves(matrices):
+    return numpy.ptp(matrices, axis=0).max() > 1e-7
+
+
+def _read_keyed(scene, objects):
+    n = scene.carillon.sub_frames or _key_density(objects)
+    frames = scene.frame_start + numpy.arange((scene.frame_end - scene.frame_start) * n + 1) / n
+    matrices = rebake.poses(scene, [*objects, None], frames)
+    scene.frame_set(scene.frame_start)
+    return Motion(_surfaces(scene, objects, matrices, False), matrices, n * rebake.frames_per_s(scene),
+                  "the keys, one pose for each frame" if n == 1 else f"the keys, {n} poses for each frame")
+
+
+def _key_density(objects):
+    """How many keys a frame has at most; keys that are farther apart tell nothing between frames."""
+    distances = [after.co[0] - before.co[0] for obj in objects if obj.animation_data and obj.animation_data.action
+                 for curve in obj.animation_data.action.fcurves
+                 for before, after in zip(curve.keyframe_points, curve.keyframe_points[1:])]
+    return max(1, round(1 / max(0.01, float(numpy.median(distances))))) if distances else 1
+
+
+def _read_simulated(scene, objects, free, tell):
+    cache = scene.rigidbody_world.point_cache
+    start, last = cache.frame_start, min(scene.frame_end, cache.frame_end)
+    shown = scene.frame_start
+    begin = min(start, shown)
+    rate, n = rebake.frames_per_s(scene), scene.carillon.sub_frames or rebake.divisor(scene)
+    steps = scene.rigidbody_world.substeps_per_frame
+    seen = rebake.poses(scene, [*objects, None], range(begin, last + 1))
+    scene.frame_set(begin)
+    surfaces = _surfaces(scene, objects, seen, True)
+    matrices, how = seen, "the frames of the simulation"
+    if steps % n == 0:
+        tell(0.15, "Simulating each step as a frame")
+        rows = [objects.index(obj) for obj in free]
+        driven = [i for i, obj in enumerate(objects) if obj.rigid_body and obj not in free and _moves(seen[i])]
+        fine = rebake.resimulate(scene, free, [objects[i] for i in driven], seen[driven, start - begin:], start, last,
+                                 n)
+        apart = numpy.abs(fine[:, ::n] - seen[rows, start - begin:]).max((0, 2, 3))
+        alike = apart.max() <= ALIKE_M / settings.metres_per_unit(bpy.context.scene)
+        how = _comparison(apart, start, alike)
+        if alike:
+            matrices = _between(seen, n)
+            matrices[rows, (start - begin) * n:] = fine
+    n = n if matrices is not seen else 1
+    return Motion(surfaces, matrices[:, (shown - begin) * n:], n * rate, how, n == steps)
+
+
+def _comparison(apart, start, alike):
+    if apart.max() == 0:
+        return "each step of the simulation, bit for bit the same animation"
+    first = start + numpy.argmax(apart > 0)
+    if alike:
+        return f"each step of the simulation, which differs by up to {apart.max():.2g} from frame {first} on"
+    return f"the frames alone, since simulating each step gave another animation from frame {first} on"
+
+
+def _between(seen, n):
+    """n poses for each frame, on straight lines, as the simulator moves what is driven."""
+    at = numpy.arange((seen.shape[1] - 1) * n + 1)
+    before = numpy.minimum(at // n, seen.shape[1] - 2)
+    share = ((at - before * n) / n)[None, :, None, None]
+    return (1 - share) * seen[:, before] + share * seen[:, before + 1]
