@@ -16,8 +16,8 @@ constexpr double kBlowCost = 1.6;
 constexpr double kFreeGap = 0.3;
 /// The share of the costs that remains in the second solution, whose support is known.
 constexpr double kBiasedShare = 0.02;
-/// A solution ends when no unknown changes a velocity by more, m/s.
-constexpr double kEndSpeed = 2e-6;
+/// An unknown that explains less of a velocity stays zero, m/s.
+constexpr double kLeastExplained = 2e-6;
 /// A load around a blow that gives less than this share of its impulse may be part of it.
 constexpr double kFaintShare = 0.2;
 /// Impulses are joined if the momentum of no node becomes less explained by more than this share.
@@ -220,10 +220,11 @@ void ContactProblem::Solve(int variant) {
       balance_.ScaleCost(i, Varied(candidates_[i], variant));
     }
   }
-  balance_.Solve(1, kEndSpeed);
+  balance_.Solve(1, kLeastExplained);
   std::vector<Cluster> clusters = FindClusters();
   balance_.AllowOnlyActive();
-  balance_.Solve(kBiasedShare, kEndSpeed);
+  balance_.Solve(kBiasedShare, kLeastExplained);
+  if (variant > 0) return;
   std::vector<double> residuals;
   for (Cluster& cluster : clusters) {
     double given = 0;
@@ -233,7 +234,7 @@ void ContactProblem::Solve(int variant) {
     }
   }
   for (Cluster& cluster : clusters) Join(cluster);
-  balance_.Solve(kBiasedShare, kEndSpeed);
+  balance_.Solve(kBiasedShare, kLeastExplained);
   for (size_t c = 0; c < clusters.size(); ++c) {
     double given = 0;
     const double after = ResidualAround(clusters[c], given);
@@ -243,7 +244,7 @@ void ContactProblem::Solve(int variant) {
       balance_.Set(clusters[c].members[n], clusters[c].before[n]);
     }
   }
-  balance_.Solve(kBiasedShare, kEndSpeed);
+  balance_.Solve(kBiasedShare, kLeastExplained);
 }
 
 void ContactProblem::Tell(std::vector<BodyMotion>& motions) const {

@@ -16,7 +16,8 @@ class ContactProblem {
                  std::vector<Candidate> candidates);
 
   /// Solves, removes the bias of the costs, and joins impulses that cannot be told apart. With a
-  /// `variant` above zero each cost is multiplied by a number of its own from 1/2 to 2.
+  /// `variant` above zero each cost is multiplied by a number of its own from 1/2 to 2, and
+  /// nothing is joined.
   void Solve(int variant = 0);
 
   const std::vector<Candidate>& candidates() const { return candidates_; }

@@ -6,6 +6,8 @@
 #include <map>
 #include <numeric>
 
+#include "client_sdk/motion/in_parallel.h"
+
 namespace carillon::motion {
 namespace {
 
@@ -221,7 +223,7 @@ void ContactSearch::Add(Candidate candidate, double time_s, Path path,
 }
 
 void ContactSearch::AddLoads(size_t p, const std::vector<PairFrame>& frames,
-                             std::vector<Candidate>& out) {
+                             std::vector<Candidate>& out) const {
   const BodyPair& pair = pairs_[p];
   const size_t body = bodies_.motions[pair.a].balanced() ? pair.a : pair.b;
   for (size_t k = 1; k + 1 < frames_; ++k) {
@@ -284,15 +286,19 @@ void ContactSearch::AddBlows(size_t p, const std::vector<PairFrame>& frames, boo
 
 std::vector<Candidate> ContactSearch::Find(bool known) {
   std::vector<std::vector<PairFrame>> frames(pairs_.size());
-  for (size_t p = 0; p < pairs_.size(); ++p) {
+  InParallel(pairs_.size(), [&](size_t p) {
     FindAtFrames(p, frames[p]);
     FindOffset(pairs_[p], frames[p]);
-  }
+  });
   MarkPiles(frames);
+  std::vector<std::vector<Candidate>> of_pair(pairs_.size());
+  InParallel(pairs_.size(), [&](size_t p) {
+    AddLoads(p, frames[p], of_pair[p]);
+    AddBlows(p, frames[p], known, of_pair[p]);
+  });
   std::vector<Candidate> candidates;
-  for (size_t p = 0; p < pairs_.size(); ++p) {
-    AddLoads(p, frames[p], candidates);
-    AddBlows(p, frames[p], known, candidates);
+  for (const std::vector<Candidate>& some : of_pair) {
+    candidates.insert(candidates.end(), some.begin(), some.end());
   }
   return candidates;
 }

@@ -79,7 +79,8 @@ class ContactSearch {
   void FindAtFrames(size_t pair, std::vector<PairFrame>& frames) const;
   void FindOffset(BodyPair& pair, const std::vector<PairFrame>& frames) const;
   void MarkPiles(std::vector<std::vector<PairFrame>>& frames);
-  void AddLoads(size_t pair, const std::vector<PairFrame>& frames, std::vector<Candidate>& out);
+  void AddLoads(size_t pair, const std::vector<PairFrame>& frames,
+                std::vector<Candidate>& out) const;
   void AddBlows(size_t pair, const std::vector<PairFrame>& frames, bool known,
                 std::vector<Candidate>& out) const;
   void Add(Candidate candidate, double time_s, Path path, std::vector<Candidate>& out) const;

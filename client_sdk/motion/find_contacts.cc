@@ -10,6 +10,7 @@
 #include "client_sdk/motion/contact_problem.h"
 #include "client_sdk/motion/contact_reading.h"
 #include "client_sdk/motion/contact_search.h"
+#include "client_sdk/motion/in_parallel.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -19,7 +20,7 @@ namespace {
 /// A larger turn between two frames cannot be told from one the other way around, rad.
 constexpr double kMostTurn = 2.5;
 constexpr int kPasses = 3;
-constexpr int kVariants = 2;
+constexpr size_t kVariants = 2;
 
 absl::Status Refused(absl::string_view reason, absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, what);
@@ -145,12 +146,12 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
     if (pass + 1 < kPasses) problem->Tell(bodies->motions);
   }
   FoundContacts found = ReadContacts(motion, *bodies, search, *problem);
-  std::vector<FoundContacts> others;
-  for (int variant = 1; variant <= kVariants; ++variant) {
+  std::vector<FoundContacts> others(kVariants);
+  InParallel(others.size(), [&](size_t i) {
     ContactProblem varied(motion, *bodies, search, problem->candidates());
-    varied.Solve(variant);
-    others.push_back(ReadContacts(motion, *bodies, search, varied));
-  }
+    varied.Solve(static_cast<int>(i) + 1);
+    others[i] = ReadContacts(motion, *bodies, search, varied);
+  });
   SetAmbiguity(found, others, motion.frame_s);
   SetNearest(motion, *bodies, found.confidence);
   return found;

@@ -3,17 +3,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "client_sdk/motion/in_parallel.h"
 
 namespace carillon::motion {
 namespace {
 
-/// An unknown that does not change is left out of so many sweeps.
-constexpr int kRest = 7;
+/// An island is solved when a sweep gains less than this share of its energy, in J per J. Where the
+/// costs decide, they decide little, and sooner than that is soon enough.
+constexpr double kEndShare = 1e-10, kEndShareOfCosts = 1e-6;
+/// An unknown whose change gains less than this share of the mean rests for some sweeps.
+constexpr double kFaintGain = 0.01;
+constexpr int kRestSweeps = 3;
 
 Matrix Cross(const Vector& v) {
   Matrix m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return m;
+}
+
+/// True in the cone |tangent| <= friction * normal component.
+bool InCone(const Vector& f, const Vector& normal, double friction) {
+  const double along = f.dot(normal);
+  return along >= 0 && f.squaredNorm() <= (1 + friction * friction) * along * along;
 }
 
 /// Returns the nearest point of the cone |tangent| <= friction * normal component.
@@ -38,8 +52,6 @@ void MomentumBalance::AddNode(size_t body, size_t frame, double mass_kg,
   Row& r = row(static_cast<int>(body), frame);
   r.inverse_mass = 1 / mass_kg;
   r.inverse_inertia = inverse_inertia;
-  r.impulse = impulse;
-  r.torque = torque;
   r.velocity = impulse / mass_kg;
   r.angular = inverse_inertia * torque;
   r.given = impulse.dot(r.velocity) + torque.dot(r.angular);
@@ -52,41 +64,41 @@ size_t MomentumBalance::Add(const Unknown& unknown) {
   return unknowns_.size() - 1;
 }
 
-Vector MomentumBalance::Gradient(const Unknown& u) const {
-  Vector gradient = Vector::Zero();
+/// Returns the velocity that a body lacks at the point of an unknown, by its weights; of a joint's
+/// torque, the angular one.
+Vector MomentumBalance::Missing(const Unknown& u, int body, const Vector& arm) const {
+  if (body < 0) return Vector::Zero();
+  const Row* rows = &row(body, 0);
+  Vector velocity = Vector::Zero(), angular = Vector::Zero();
   for (int i = 0; i < u.node_count; ++i) {
     const auto& [frame, weight] = u.nodes[static_cast<size_t>(i)];
-    Vector relative = Vector::Zero();
-    if (u.kind == UnknownKind::kJointTorque) {
-      if (u.a >= 0) relative += row(u.a, frame).angular;
-      if (u.b >= 0) relative -= row(u.b, frame).angular;
-    } else {
-      if (u.a >= 0) relative += row(u.a, frame).velocity + row(u.a, frame).angular.cross(u.arm_a);
-      if (u.b >= 0) relative -= row(u.b, frame).velocity + row(u.b, frame).angular.cross(u.arm_b);
-    }
-    gradient += weight * relative;
+    velocity += weight * rows[frame].velocity;
+    angular += weight * rows[frame].angular;
   }
-  return gradient;
+  if (u.kind == UnknownKind::kJointTorque) return angular;
+  return velocity + angular.cross(arm);
+}
+
+Vector MomentumBalance::Gradient(const Unknown& u) const {
+  return Missing(u, u.a, u.arm_a) - Missing(u, u.b, u.arm_b);
+}
+
+void MomentumBalance::Push(const Unknown& u, int body, const Vector& arm, const Vector& f) {
+  if (body < 0) return;
+  Row* rows = &row(body, 0);
+  const bool turns = u.kind == UnknownKind::kJointTorque;
+  const Vector torque = turns ? f : arm.cross(f);
+  for (int i = 0; i < u.node_count; ++i) {
+    const auto& [frame, weight] = u.nodes[static_cast<size_t>(i)];
+    Row& r = rows[frame];
+    r.angular -= weight * (r.inverse_inertia * torque);
+    if (!turns) r.velocity -= weight * r.inverse_mass * f;
+  }
 }
 
 void MomentumBalance::Change(const Unknown& u, const Vector& change) {
-  for (int i = 0; i < u.node_count; ++i) {
-    const auto& [frame, weight] = u.nodes[static_cast<size_t>(i)];
-    for (const int side : {1, -1}) {
-      const int body = side > 0 ? u.a : u.b;
-      if (body < 0) continue;
-      Row& r = row(body, frame);
-      if (r.inverse_mass == 0) continue;
-      const Vector f = side * weight * change;
-      const Vector torque =
-          u.kind == UnknownKind::kJointTorque ? f : Vector((side > 0 ? u.arm_a : u.arm_b).cross(f));
-      r.torque -= torque;
-      r.angular -= r.inverse_inertia * torque;
-      if (u.kind == UnknownKind::kJointTorque) continue;
-      r.impulse -= f;
-      r.velocity -= r.inverse_mass * f;
-    }
-  }
+  Push(u, u.a, u.arm_a, change);
+  Push(u, u.b, u.arm_b, -change);
 }
 
 MomentumBalance::Active MomentumBalance::MakeActive(size_t index) const {
@@ -127,44 +139,118 @@ bool MomentumBalance::Wants(size_t i, double cost_factor, double least) const {
   return along + u.friction * across > cost_factor * u.cost + least;
 }
 
-/// Returns the f of the cone that minimizes 1/2 f' H f - pull' f + cost * normal component.
+/// Returns an f of the cone that lessens 1/2 f' H f - pull' f + cost * normal component: the least
+/// one, unless that slides. Then it is the best along the ray that a step down the gradient
+/// reaches.
 Vector MomentumBalance::Best(const Active& active, const Vector& pull, double cost) const {
-  constexpr int kSteps = 3;
   const Unknown& u = unknowns_[active.unknown];
   if (u.kind != UnknownKind::kContact) return active.inverse * pull;
   const Vector drive = pull - cost * u.normal;
+  if (InCone(-drive, u.normal, 1 / u.friction)) return Vector::Zero();
   Vector f = active.inverse * drive;
-  if (Project(f, u.normal, u.friction) == f) return f;
+  if (InCone(f, u.normal, u.friction)) return f;
   f = values_[active.unknown];
-  for (int i = 0; i < kSteps; ++i) {
-    f = Project(f + (drive - active.hessian * f) / active.largest, u.normal, u.friction);
-  }
-  return f;
+  f = Project(f + (drive - active.hessian * f) / active.largest, u.normal, u.friction);
+  const double along = drive.dot(f);
+  return along > 0 ? Vector(along / f.dot(active.hessian * f) * f) : Vector(Vector::Zero());
 }
 
-double MomentumBalance::Sweep(std::vector<Active>& active, double cost_factor, double least,
+/// Improves each unknown in turn, and returns what the energy loses by it, J, twice.
+double MomentumBalance::Sweep(std::span<Active> island, double cost_factor, double faint_gain,
                               bool backwards) {
-  double largest = 0;
-  for (size_t n = 0; n < active.size(); ++n) {
-    Active& one = active[backwards ? active.size() - 1 - n : n];
-    if (one.largest == 0 || --one.rests > 0) continue;
+  double gained = 0;
+  for (size_t n = 0; n < island.size(); ++n) {
+    Active& one = island[backwards ? island.size() - 1 - n : n];
+    one.step.setZero();
+    if (one.largest == 0 || one.rests-- > 0) continue;
     const Unknown& u = unknowns_[one.unknown];
     Vector& value = values_[one.unknown];
     const Vector pull = Gradient(u) + one.hessian * value;
-    const Vector best = Best(one, pull, cost_factor * u.cost);
-    const Vector change = best - value;
-    const double speed = (one.hessian * change).norm();
-    if (speed < least) one.rests = kRest;
-    if (speed == 0) continue;
-    value = best;
+    const Vector change = Best(one, pull, cost_factor * u.cost) - value;
+    const double gain = change.dot(one.hessian * change);
+    one.rests = gain <= faint_gain ? kRestSweeps : 0;
+    if (gain == 0) continue;
+    one.step = change;
+    value += change;
     Change(u, change);
-    largest = std::max(largest, speed);
+    gained += gain;
   }
-  return largest;
+  return gained;
+}
+
+/// Repeats the steps of the sweeps before, as conjugate gradients do, `share` times as large (M.
+/// Silcowitz, S. Niebe and K. Erleben, A nonsmooth nonlinear conjugate gradient method for
+/// interactive contact force problems, The Visual Computer 26, 2010). A share above 1 begins anew.
+void MomentumBalance::Repeat(std::span<Active> island, double share) {
+  for (Active& one : island) {
+    if (share > 1) {
+      one.direction = one.step;
+      continue;
+    }
+    one.direction *= one.rests > 0 ? 0 : share;
+    if (!one.direction.isZero(0)) {
+      const Unknown& u = unknowns_[one.unknown];
+      Vector& value = values_[one.unknown];
+      Vector next = value + one.direction;
+      if (u.kind == UnknownKind::kContact) next = Project(next, u.normal, u.friction);
+      Change(u, next - value);
+      value = next;
+    }
+    one.direction += one.step;
+  }
+}
+
+void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double end_gain) {
+  constexpr int kMostSweeps = 100;
+  double before = 0;
+  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+    const double faint = kFaintGain * before / static_cast<double>(island.size());
+    const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
+    if (gained <= end_gain) return;
+    Repeat(island, before > 0 ? gained / before : 2);
+    before = gained;
+  }
+}
+
+/// Sorts unknowns into islands, which share no node.
+std::vector<MomentumBalance::Island> MomentumBalance::FindIslands(
+    std::vector<Active>& active) const {
+  std::vector<uint32_t> root(rows_.size());
+  std::iota(root.begin(), root.end(), 0U);
+  const auto find = [&](size_t i) {
+    while (root[i] != i) i = root[i] = root[root[i]];
+    return static_cast<uint32_t>(i);
+  };
+  const auto of = [&](const Active& one) {
+    const Unknown& u = unknowns_[one.unknown];
+    return find(static_cast<size_t>(std::max(u.a, u.b)) * frames_ + u.nodes[0].frame);
+  };
+  for (const Active& one : active) {
+    const Unknown& u = unknowns_[one.unknown];
+    for (const int body : {u.a, u.b}) {
+      for (int i = 0; body >= 0 && i < u.node_count; ++i) {
+        root[find(static_cast<size_t>(body) * frames_ + u.nodes[static_cast<size_t>(i)].frame)] =
+            of(one);
+      }
+    }
+  }
+  std::vector<double> energy(rows_.size(), 0);
+  for (size_t i = 0; i < rows_.size(); ++i) energy[find(i)] += rows_[i].given;
+  for (Active& one : active) one.island = of(one);
+  const auto place = [](const Active& one) { return std::pair(one.island, one.unknown); };
+  std::ranges::sort(active, {}, place);
+  std::vector<Island> islands;
+  for (size_t i = 0; i < active.size(); ++i) {
+    if (i == 0 || active[i].island != active[i - 1].island) {
+      islands.push_back({.first = i, .energy = energy[active[i].island]});
+    }
+    ++islands.back().count;
+  }
+  return islands;
 }
 
 void MomentumBalance::Solve(double cost_factor, double least) {
-  constexpr int kMostRounds = 12, kMostSweeps = 150;
+  constexpr int kMostRounds = 3;
   std::vector<bool> is_active(unknowns_.size(), false);
   std::vector<Active> active;
   for (int round = 0; round < kMostRounds; ++round) {
@@ -175,10 +261,11 @@ void MomentumBalance::Solve(double cost_factor, double least) {
       active.push_back(MakeActive(i));
     }
     if (round > 0 && active.size() == before) break;
-    int quiet = 0;
-    for (int sweep = 0; sweep < kMostSweeps && quiet <= kRest; ++sweep) {
-      quiet = Sweep(active, cost_factor, least, sweep % 2 == 1) < least ? quiet + 1 : 0;
-    }
+    const std::vector<Island> islands = FindIslands(active);
+    InParallel(islands.size(), [&](size_t i) {
+      SolveIsland(std::span(active).subspan(islands[i].first, islands[i].count), cost_factor,
+                  (cost_factor < 1 ? kEndShare : kEndShareOfCosts) * islands[i].energy);
+    });
     std::erase_if(active, [&](const Active& one) {
       const bool idle = values_[one.unknown].isZero(0);
       if (idle) is_active[one.unknown] = false;
@@ -209,7 +296,9 @@ double MomentumBalance::Given(size_t body, size_t frame) const {
 
 double MomentumBalance::Residual(size_t body, size_t frame) const {
   const Row& r = row(static_cast<int>(body), frame);
-  return r.impulse.dot(r.velocity) + r.torque.dot(r.angular);
+  if (r.inverse_mass == 0) return 0;
+  return r.velocity.squaredNorm() / r.inverse_mass +
+         r.angular.dot(r.inverse_inertia.inverse() * r.angular);
 }
 
 }  // namespace carillon::motion

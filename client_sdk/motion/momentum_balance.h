@@ -3,6 +3,7 @@
 
 #include <array>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "client_sdk/motion/motion.h"
@@ -42,7 +43,8 @@ struct Unknown {
 ///     min 1/2 |A x - b|^2 + c' x    over x in the cones of friction,
 ///
 /// where rows are scaled to energy: by m^(-1/2) and I^(-1/2). Blocks of three unknowns are solved
-/// for in turn (block coordinate descent), most of which never leave zero.
+/// for in turn (block coordinate descent with conjugate directions), most of which never leave
+/// zero. Islands of unknowns that share no node are solved apart, in parallel.
 class MomentumBalance {
  public:
   MomentumBalance(size_t body_count, size_t frame_count);
@@ -53,8 +55,8 @@ class MomentumBalance {
   /// Returns the index of the unknown.
   size_t Add(const Unknown& unknown);
 
-  /// Solves with costs times `cost_factor`, from the values that the unknowns have, until no
-  /// unknown changes a velocity by more than `least_m_per_s`.
+  /// Solves with costs times `cost_factor`, from the values that the unknowns have. An unknown
+  /// that would explain less than `least_m_per_s` of a velocity beyond its cost stays zero.
   void Solve(double cost_factor, double least_m_per_s);
 
   /// Unknowns that are not allowed are zero.
@@ -74,26 +76,37 @@ class MomentumBalance {
   struct Row {
     double inverse_mass = 0;  ///< zero: no such node
     Matrix inverse_inertia = Matrix::Zero();
-    Vector impulse = Vector::Zero(), torque = Vector::Zero();    ///< of b - A x
-    Vector velocity = Vector::Zero(), angular = Vector::Zero();  ///< the same, divided by m and I
+    Vector velocity = Vector::Zero(), angular = Vector::Zero();  ///< of b - A x, by m and I
     double given = 0;
   };
   struct Active {
     size_t unknown = 0;
     Matrix hessian = Matrix::Zero(), inverse = Matrix::Zero();
     double largest = 0;  ///< bound of the eigenvalues of the Hessian
-    int rests = 0;       ///< sweeps that leave it out, because it hardly changed
+    uint32_t island = 0;
+    int rests = 0;                      ///< sweeps that leave it out, because it hardly changed
+    Vector step = Vector::Zero();       ///< of the last sweep
+    Vector direction = Vector::Zero();  ///< of the sweeps before
+  };
+  struct Island {
+    size_t first = 0, count = 0;  ///< of the active unknowns
+    double energy = 0;            ///< of b at its nodes, J
   };
   Row& row(int body, size_t frame) { return rows_[static_cast<size_t>(body) * frames_ + frame]; }
   const Row& row(int body, size_t frame) const {
     return rows_[static_cast<size_t>(body) * frames_ + frame];
   }
+  Vector Missing(const Unknown& u, int body, const Vector& arm) const;
+  void Push(const Unknown& u, int body, const Vector& arm, const Vector& f);
   Vector Gradient(const Unknown& u) const;
   void Change(const Unknown& u, const Vector& change);
   Active MakeActive(size_t i) const;
   bool Wants(size_t i, double cost_factor, double least) const;
   Vector Best(const Active& active, const Vector& pull, double cost) const;
-  double Sweep(std::vector<Active>& active, double cost_factor, double least, bool backwards);
+  double Sweep(std::span<Active> island, double cost_factor, double faint_gain, bool backwards);
+  void Repeat(std::span<Active> island, double share);
+  void SolveIsland(std::span<Active> island, double cost_factor, double end_gain);
+  std::vector<Island> FindIslands(std::vector<Active>& active) const;
 
   size_t frames_;
   std::vector<Row> rows_;

@@ -11,7 +11,7 @@ import pathlib
 import subprocess
 
 COLUMNS = ("scene", "frames/s", "found (share of J)", "false (J)", "dt, dt90, ms", "size of J, J as vector",
-           "point, mm", "unexplained", "ambiguous", "CPU, s")
+           "point, mm", "unexplained", "ambiguous", "CPU, wall, s")
 
 
 def main():
