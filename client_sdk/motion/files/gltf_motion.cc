@@ -56,7 +56,9 @@ std::vector<double> Slerp(const double* a, const double* b, double share) {
 }
 
 std::vector<double> Channel::At(double time) const {
-  const auto next = std::ranges::upper_bound(times, time);
+  // A frame's time is that of a key but for its rounding, which would show the key before.
+  const double early = interpolation == "STEP" ? 1e-4 : 0;
+  const auto next = std::ranges::upper_bound(times, time + early);
   if (next == times.begin()) return {Key(0), Key(0) + width};
   const auto k = static_cast<size_t>(next - times.begin()) - 1;
   if (k + 1 == times.size() || interpolation == "STEP") return {Key(k), Key(k) + width};
@@ -198,13 +200,13 @@ class MotionReader {
     EachChanging([&](size_t node, const Channel& channel) {
       for (size_t k = 1; k < channel.times.size(); ++k) {
         const double frames = (channel.times[k] - channel.times[k - 1]) / scene_.motion.frame_s;
-        if (std::abs(frames - 1) < 0.1 && channel.interpolation != "STEP") continue;
+        if (std::abs(frames - 1) < 0.1) continue;
         throw MotionFault{
             "MOTION_TOO_COARSE",
             absl::StrCat("the keys of ", NameOf(document_.root()["nodes"][node], node), " are ",
                          channel.times[k] - channel.times[k - 1], " s apart after ",
                          channel.times[k - 1], " s, and others ", scene_.motion.frame_s,
-                         " s: export one linear key for each frame (in Blender: Sampling "
+                         " s: export one key for each frame (in Blender: Sampling "
                          "Animations, without Optimize Animation Size)")};
       }
     });

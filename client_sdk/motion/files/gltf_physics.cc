@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <utility>
 
 namespace carillon::motion {
 
@@ -42,12 +43,19 @@ std::optional<Vector> VectorOf(const json& list) {
   return Vector(list[0].get<double>(), list[1].get<double>(), list[2].get<double>());
 }
 
-void ReadMotion(const json& motion, MovingBody& body, SceneBody& about) {
+/// Moves a point of a node into the frame of its body, which has no scale.
+Vector InBody(const GltfMatrix& world, const GltfPoint& point, const BodyPose& pose) {
+  const GltfPoint moved = Moved(world, point);
+  return pose.orientation.conjugate() * (Vector(moved[0], moved[1], moved[2]) - pose.position_m);
+}
+
+void ReadMotion(const json& motion, const GltfMatrix& world, MovingBody& body, SceneBody& about) {
   about.driven = motion.value("isKinematic", false) || motion.value("type", "") == "kinematic";
   about.mass_kg = motion.value("mass", 0.0);
   if (const auto centre = VectorOf(Member(motion, "centerOfMass"))) {
     about.has_centre = true;
-    body.centre_of_mass_m = *centre;
+    body.centre_of_mass_m =
+        InBody(world, {centre->x(), centre->y(), centre->z()}, body.poses.front());
   }
   const auto moments = VectorOf(Member(motion, "inertiaDiagonal"));
   if (moments && moments->minCoeff() > 0) {
@@ -68,14 +76,14 @@ void ReadCollider(const GltfDocument& document, const json& collider, const Gltf
                   MovingBody& body) {
   const json& mesh = Member(Member(collider, "geometry"), "mesh");
   if (mesh.is_null()) return;
-  const BodyPose& pose = body.poses.front();
   for (const json& primitive : Member(document.At("meshes", mesh), "primitives")) {
     GltfSurface surface = ReadPrimitive(document, primitive, json::array());
     for (GltfPoint& p : surface.points) {
-      const GltfPoint moved = Moved(world, p);
-      const Vector point =
-          pose.orientation.conjugate() * (Vector(moved[0], moved[1], moved[2]) - pose.position_m);
+      const Vector point = InBody(world, p, body.poses.front());
       p = {point.x(), point.y(), point.z()};
+    }
+    for (size_t i = 0; IsMirroring(world) && i + 2 < surface.corners.size(); i += 3) {
+      std::swap(surface.corners[i + 1], surface.corners[i + 2]);
     }
     AddSurface(surface, body.collider);
   }
@@ -94,7 +102,7 @@ void ReadGltfPhysics(const GltfDocument& document, const json& node, const GltfM
   const json& motion = khronos_motion.is_object()          ? khronos_motion
                        : Member(omi, "motion").is_object() ? Member(omi, "motion")
                                                            : omi;
-  if (motion.is_object()) ReadMotion(motion, body, about);
+  if (motion.is_object()) ReadMotion(motion, world, body, about);
   const json& collider = Member(khronos, "collider");
   ReadCollider(document, collider, world, body);
   const json& material = Member(collider, "physicsMaterial");

@@ -40,8 +40,8 @@ struct MotionScene {
 absl::StatusOr<MotionScene> ReadGltfMotion(const std::string& path, bool even_if_coarse);
 
 /// Reads a table of poses, without surfaces: a text of the columns t, body, x, y, z, qw, qx, qy, qz
-/// (.csv, metres and seconds, with a line of names), or a NumPy archive (.npz) of the arrays times
-/// (F), bodies (B names), positions (F, B, 3) and orientations (F, B, 4: w, x, y, z). Errors:
+/// (.csv, seconds; a line of names gives their order), or a NumPy archive (.npz) of the arrays
+/// times (F), bodies (B names), positions (F, B, 3) and orientations (F, B, 4: w, x, y, z). Errors:
 /// NotFound (FILE_NOT_FOUND), InvalidArgument (MOTION_MALFORMED).
 absl::StatusOr<MotionScene> ReadPoseTable(const std::string& path);
 

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <numeric>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "client_sdk/interchange/npy_array.h"
 #include "client_sdk/interchange/zip_archive.h"
@@ -41,35 +45,97 @@ BodyPose PoseOf(const double* x, const double* q) {
   return {{x[0], x[1], x[2]}, Turn(q[0], q[1], q[2], q[3])};
 }
 
+constexpr std::array<const char*, 9> kColumns = {"t",  "body", "x",  "y", "z",
+                                                 "qw", "qx",   "qy", "qz"};
+
+/// Reads a text of poses, whose line of names says in which order its columns are.
+class PoseTextReader {
+ public:
+  explicit PoseTextReader(const std::string& path) : path_(path) {
+    std::iota(place_.begin(), place_.end(), size_t{0});
+  }
+
+  absl::Status Read(std::string line) {
+    if (++line_number_ == 1 && absl::StartsWith(line, "\xEF\xBB\xBF")) line.erase(0, 3);
+    std::vector<std::string> cells = absl::StrSplit(
+        line, line.find(',') == std::string::npos ? absl::ByAnyChar(";\t") : absl::ByAnyChar(","));
+    for (std::string& cell : cells) absl::StripAsciiWhitespace(&cell);
+    if (cells.size() == 1 && cells[0].empty()) return absl::OkStatus();
+    double t = 0;
+    const bool named =
+        std::exchange(first_, false) &&
+        std::ranges::none_of(cells, [&](const auto& c) { return absl::SimpleAtod(c, &t); });
+    return named ? ReadNames(cells) : ReadPose(cells);
+  }
+
+  absl::StatusOr<MotionScene> Take() {
+    RETURN_IF_ERROR(SetTimes(path_, times_, scene_.motion));
+    return std::move(scene_);
+  }
+
+ private:
+  absl::Status ReadNames(const std::vector<std::string>& cells) {
+    for (size_t i = 0; i < kColumns.size(); ++i) {
+      const auto same = [&](const std::string& cell) {
+        return absl::EqualsIgnoreCase(cell, kColumns[i]);
+      };
+      const auto at = std::ranges::find_if(cells, same);
+      if (at == cells.end()) {
+        return Malformed(path_,
+                         absl::StrCat("the column ", kColumns[i], " is missing: name the columns ",
+                                      absl::StrJoin(kColumns, ","), ", in any order"));
+      }
+      place_[i] = static_cast<size_t>(at - cells.begin());
+    }
+    column_count_ = cells.size();
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadPose(const std::vector<std::string>& cells) {
+    double t = 0;
+    std::array<double, 7> x{};
+    bool good = cells.size() == column_count_ && absl::SimpleAtod(cells[place_[0]], &t);
+    for (size_t i = 0; i < x.size() && good; ++i) {
+      good = absl::SimpleAtod(cells[place_[i + 2]], &x[i]) && std::isfinite(x[i]);
+    }
+    if (!good) {
+      return Malformed(path_,
+                       absl::StrCat("line ", line_number_, " has no number for each of ",
+                                    absl::StrJoin(kColumns, ","),
+                                    ": fill gaps, or cut the time in which a body is not seen"));
+    }
+    const auto [at, is_new] = bodies_.try_emplace(cells[place_[1]], scene_.motion.bodies.size());
+    if (is_new) scene_.motion.bodies.emplace_back().name = at->first;
+    std::vector<BodyPose>& poses = scene_.motion.bodies[at->second].poses;
+    const size_t frame = poses.size();
+    if (frame == times_.size() && (frame == 0 || t > times_.back())) times_.push_back(t);
+    if (frame == times_.size() || times_[frame] != t) {
+      return Malformed(
+          path_, absl::StrCat("line ", line_number_, " has ", at->first, " at ", t,
+                              " s: each body needs one pose at each time, in the order of times"));
+    }
+    poses.push_back(PoseOf(x.data(), x.data() + 3));
+    return absl::OkStatus();
+  }
+
+  std::string path_;
+  size_t line_number_ = 0, column_count_ = kColumns.size();
+  bool first_ = true;  ///< no line with text was read
+  std::array<size_t, kColumns.size()> place_;
+  std::map<std::string, size_t> bodies_;
+  std::vector<double> times_;
+  MotionScene scene_;
+};
+
 absl::StatusOr<MotionScene> ReadCsv(const std::string& path) {
   std::ifstream file(path);
   if (!file) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat(path, " cannot be opened"));
   }
-  MotionScene scene;
-  std::map<std::string, size_t> bodies;
-  std::vector<double> times;
-  std::string line;
-  for (size_t number = 1; std::getline(file, line); ++number) {
-    const std::vector<std::string> cells = absl::StrSplit(absl::StripAsciiWhitespace(line), ',');
-    double t = 0;
-    if (number == 1 && !absl::SimpleAtod(cells[0], &t)) continue;  // the line of names
-    if (cells.size() == 1 && cells[0].empty()) continue;
-    std::array<double, 7> x{};
-    bool good = cells.size() == 9 && absl::SimpleAtod(cells[0], &t);
-    for (size_t i = 0; i < 7 && good; ++i) good = absl::SimpleAtod(cells[i + 2], &x[i]);
-    if (!good) {
-      return Malformed(path, absl::StrCat("line ", number, " is not t,body,x,y,z,qw,qx,qy,qz"));
-    }
-    if (times.empty() || t > times.back()) times.push_back(t);
-    const std::string name(absl::StripAsciiWhitespace(cells[1]));
-    const auto [at, is_new] = bodies.try_emplace(name, scene.motion.bodies.size());
-    if (is_new) scene.motion.bodies.emplace_back().name = name;
-    scene.motion.bodies[at->second].poses.push_back(PoseOf(x.data(), x.data() + 3));
-  }
-  RETURN_IF_ERROR(SetTimes(path, times, scene.motion));
-  return scene;
+  PoseTextReader reader(path);
+  for (std::string line; std::getline(file, line);) RETURN_IF_ERROR(reader.Read(line));
+  return reader.Take();
 }
 
 absl::StatusOr<interchange::NpyArray> ArrayOf(const interchange::ZipReader& zip,

@@ -44,8 +44,9 @@ def write_obj(path, vertices, triangles):
 
 
 def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel", drawn=SIDES_M,
-               collider=None):
-    """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z."""
+               collider=None, scale=(1, 1, 1), interpolation="LINEAR", flips=False):
+    """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z. With `flips` the
+    quaternion of the bar, which does not turn, changes its sign at each key."""
     blob, views, accessors = b"", [], []
 
     def accessor(array, kind, component):
@@ -64,7 +65,16 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
 
     times, height = heights()
     half = 0.5**0.5
-    bar = {"name": "Bar", "mesh": 0, "translation": [0, 0, 0]}
+
+    def animation(path, values):
+        values = numpy.array(values, float)[keys]
+        if interpolation == "CUBICSPLINE":  # a tangent before and after each value
+            values = numpy.stack([0 * values, values, 0 * values], 1).reshape(-1, values.shape[1])
+        return {"samplers": [{"input": accessor(times[keys], "SCALAR", 5126), "interpolation": interpolation,
+                              "output": accessor(values, f"VEC{values.shape[1]}", 5126)}],
+                "channels": [{"sampler": 0, "target": {"node": 1, "path": path}}]}
+
+    bar = {"name": "Bar", "mesh": 0, "translation": [0, 0, 0], "scale": list(scale)}
     if skin:
         bar["skin"] = 0
     if mass:
@@ -75,15 +85,14 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
     gltf = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
         "materials": [{"name": material}, {"name": "Ground"}],
-        "meshes": [mesh(drawn, 0), mesh((4, 0.2, 4), 1)],
+        "meshes": [mesh(drawn / numpy.abs(scale), 0), mesh((4, 0.2, 4), 1)],
         # The bar's own z, along which it falls, is the scene's y.
         "nodes": [{"name": "Turned", "rotation": [-half, 0, 0, half], "children": [1]}, bar,
                   {"name": "Ground", "mesh": 1, "translation": [0, -0.1, 0]},
                   {"name": "Camera", "camera": 0, "translation": [0, 0.3, 1]}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
-        "animations": [{"samplers": [{"input": accessor(times[keys], "SCALAR", 5126),
-                                      "output": accessor([(0, 0, z) for z in height[keys]], "VEC3", 5126)}],
-                        "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}],
+        "animations": [animation("translation", [(0, 0, z) for z in height])]
+        + [animation("rotation", [(0, 0, 0, (-1) ** k) for k in range(len(times))])] * flips,
         "bufferViews": views, "accessors": accessors}
     if collider:
         gltf["meshes"].append(mesh(collider[0], 0))
@@ -148,6 +157,58 @@ class FoleyTest(DaemonTest):
         # The picture is heard without the delay of the air; the sound rises within a millisecond.
         self.assertAlmostEqual(first, LANDS_S, delta=0.001)
         numpy.testing.assert_array_equal(sound.read_wave(stems / "1-Bar.wav"), samples)
+
+    def test_scaled_and_mirrored_nodes_and_each_interpolation_give_the_same_impact(self):
+        for name, form in {"scaled": {"scale": (0.1, 2, 0.5)}, "mirrored": {"scale": (1, -1, 1)},
+                           "step": {"interpolation": "STEP"}, "spline": {"interpolation": "CUBICSPLINE"},
+                           "flips": {"flips": True}, "flipped_spline": {"interpolation": "CUBICSPLINE", "flips": True}
+                           }.items():
+            with self.subTest(name):
+                write_gltf(self.folder / f"{name}.glb", **form)
+                trace = self.folder / f"{name}.contacts"
+                self.foley(f"{name}.glb", "--trace", trace)
+                self.check_impacts(trace)
+
+    def write_poses(self, name, rows, columns="t,body,x,y,z,qw,qx,qy,qz", separator=",", start="", end="\n"):
+        lines = [*([columns] if columns else []), *(",".join(map(str, row)) for row in rows)]
+        text = start + "".join(line.replace(",", separator) + end for line in lines)
+        (self.folder / name).write_bytes(text.encode())
+
+    def test_a_table_has_its_columns_in_any_order_and_any_unit(self):
+        times, height = heights()
+        rows = [(f"{t:.9g}", "Bar", 0, 0, f"{z:.9g}", 1, 0, 0, 0) for t, z in zip(times, height)]
+        trace = self.folder / "columns.contacts"
+        last = [(k, name, qx, qy, qz, qw, x, y, z, t) for k, (t, name, x, y, z, qw, qx, qy, qz) in enumerate(rows)]
+        self.write_poses("last.csv", last, "Frame,Body,QX,QY,QZ,QW,X,Y,Z,T", "; ", "\ufeff", "\r\n")
+        self.table("last.csv", "--floor", 0, "--trace", trace)
+        self.check_impacts(trace)
+        self.write_poses("bare.csv", rows, columns="", separator="\t")
+        self.table("bare.csv", "--floor", 0, "--trace", trace)
+        self.check_impacts(trace)
+        milli = [(t, name, x, y, float(z) * 1000, *q) for t, name, x, y, z, *q in rows]
+        self.write_poses("milli.csv", milli)
+        vertices, triangles = box(SIDES_M)
+        write_obj(self.folder / "milli.obj", vertices * 1000, triangles)
+        self.foley("milli.csv", "--unit", "mm", "--mesh", f"Bar={self.folder / 'milli.obj'}", "--material",
+                   "Bar=structural_steel", "--floor", 0, "--trace", trace)
+        self.check_impacts(trace)
+
+    def test_a_table_with_gaps_is_refused_with_its_line(self):
+        out = ("--trace", self.folder / "none.contacts")
+        rows = [(k / 60, name, 0, 0, 1, 1, 0, 0, 0) for k in range(10) for name in ("Bar", "Rod")]
+        empty, nan = (0.05, "Bar", "", "", "", 1, 0, 0, 0), (0.05, "Bar", "NaN", 0, 1, 1, 0, 0, 0)
+        for name, instead, line in (("gap", [], 9), ("empty", [empty], 8), ("nan", [nan], 8),
+                                    ("twice", [rows[6]] * 2, 9)):
+            wrong = [*rows[:6], *instead, *rows[7:]]
+            with self.subTest(name):
+                self.write_poses(f"{name}.csv", wrong)
+                done = self.table(f"{name}.csv", *out, check=False)
+                self.refused("MOTION_MALFORMED", done)
+                self.assertIn(f"line {line} ", done.stderr)
+        self.write_poses("names.csv", rows, "time,body,x,y,z,qw,qx,qy,qz")
+        done = self.table("names.csv", *out, check=False)
+        self.refused("MOTION_MALFORMED", done)
+        self.assertIn("the column t ", done.stderr)
 
     def test_a_mass_of_the_file_scales_the_impulse(self):
         write_gltf(self.folder / "heavy.glb", mass=2 * MASS_KG)
