@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recipes of docs/: each page's program, compiled as the page says, lets a bar fall into a real daemon."""
+"""The recipes of docs/: the program of each page runs as the page says, with a real daemon."""
 
 import os
 import pathlib
 import re
 import subprocess
+import textwrap
 import unittest
 
+import numpy
+
 import carillon
+import sound
 from daemon import BIN, ROOT, DaemonTest
 
 BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
@@ -23,7 +27,8 @@ class RecipesTest(DaemonTest):
                        stdout=subprocess.DEVNULL)
         cls.include, cls.library = prefix / "include", next(prefix.rglob("libcarillon.so")).parent
         subprocess.run([BIN / "carillon", "example", "bar"], cwd=cls.folder, check=True, stdout=subprocess.DEVNULL)
-        cls.environment = {**os.environ, "CARILLON_SERVER": cls.daemon.server, "LD_LIBRARY_PATH": str(cls.library)}
+        cls.environment = {**os.environ, "CARILLON_SERVER": cls.daemon.server, "LD_LIBRARY_PATH": str(cls.library),
+                           "PYTHONPATH": str(BUILD / "client_sdk/python")}
 
     def save(self, page, language, name):
         program = re.search(rf"(?ms)^```{language}\n(.*?)^```", (ROOT / "docs" / page).read_text())[1]
@@ -64,6 +69,54 @@ class RecipesTest(DaemonTest):
                      self.save("recipe_unreal.md", "cpp", "fall.cpp"), "-o", "fall_unreal", f"-I{self.include}",
                      f"-L{self.library}", "-lcarillon")
         self.hear_the_bar("./fall_unreal")
+
+    def run_python(self, page):
+        """Runs the program of the page, and returns what it prints."""
+        name = self.save(page, "python", f"{page}.py")
+        done = subprocess.run(["/usr/bin/python3", name], cwd=self.folder, env=self.environment, check=False,
+                              capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return done.stdout
+
+    def test_a_rod_on_steps_in_rapier(self):
+        page = (ROOT / "docs/engines.md").read_text()
+        program = page[page.index("    const rapier"):page.index("Call `removeObject")]
+        (self.folder / "rod.js").write_text(textwrap.dedent(program))
+        package = self.folder / "node_modules/carillon"
+        package.mkdir(parents=True)
+        for name in ("node/lib", "node/package.json", "adapters"):
+            (package / name.split("/")[-1]).symlink_to(ROOT / "client_sdk" / name)
+        places = (package.parent, os.environ["CARILLON_NODE_MODULES"], os.environ["CARILLON_ENGINE_MODULES"])
+        done = subprocess.run(["node", "rod.js"], cwd=self.folder, check=False, capture_output=True, text=True,
+                              env={**self.environment, "NODE_PATH": ":".join(map(str, places))})
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertRegex(done.stdout, r"blowCount: [1-9]")
+        self.assertGreater(numpy.abs(sound.read_wave(self.folder / "rod.wav")).max(), 1e-4)
+
+    def test_sampler(self):
+        self.run_python("recipe_sampler.md")
+        regions = re.findall(r"sample=(\S+) .*pitch_keycenter=(\d+) lovel=(\d+)", (self.folder / "bar.sfz").read_text())
+        self.assertEqual(len(regions), 21)
+        treble = {}
+        for file, key, velocity in regions:
+            heard = sound.read_wave(self.folder / file)[:48000, 0]
+            spectrum = numpy.abs(numpy.fft.rfft(heard * numpy.hanning(len(heard))))  # a line is a hertz
+            lowest = int(spectrum[:int(1.5 * 440 * 2**((int(key) - 69) / 12))].argmax())
+            self.assertAlmostEqual(lowest, 440 * 2**((int(key) - 69) / 12), delta=1.1, msg=file)
+            treble[key, velocity] = (spectrum[2 * lowest:]**2).sum() / (spectrum**2).sum()
+        for key in {key for _, key, _ in regions}:
+            self.assertLess(treble[key, "1"], treble[key, "48"])
+            self.assertLess(treble[key, "48"], treble[key, "96"])
+
+    def test_cracked_vase(self):
+        printed = self.run_python("recipe_cracked_vase.md")
+        figures = re.findall(r"(?m)^(\w+): \[ *([\d.]+).*\] Hz, T60 ([\d.]+) s$", printed)
+        (whole, whole_hz, whole_s), (cracked, cracked_hz, cracked_s) = figures
+        self.assertEqual((whole, cracked), ("whole", "cracked"))
+        self.assertLess(float(cracked_hz), 0.9 * float(whole_hz))
+        self.assertLess(float(cracked_s), 0.5 * float(whole_s))
+        for name in (whole, cracked):
+            self.assertGreater(numpy.abs(sound.read_wave(self.folder / f"{name}.wav")).max(), 1e-3)
 
 
 if __name__ == "__main__":
