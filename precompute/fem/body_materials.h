@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "precompute/fem/elastic_constants.h"
@@ -26,6 +27,7 @@ class BodyMaterials {
       : BodyMaterials(std::vector{RegionMaterial{"", elastic, density_kg_per_m3}}) {}
   /// The materials of the regions, in the order of the numbers in TetMesh::regions.
   explicit BodyMaterials(std::vector<RegionMaterial> regions) : regions_(std::move(regions)) {
+    lame_.reserve(regions_.size());
     for (const RegionMaterial& region : regions_) lame_.push_back(ToLame(region.elastic));
   }
 

@@ -24,6 +24,7 @@ std::string RegionText(const MeshRegion& region) {
 
 absl::Status RegionUnknown(absl::string_view what, const std::vector<MeshRegion>& regions) {
   std::vector<std::string> names;
+  names.reserve(regions.size());
   for (const MeshRegion& region : regions) names.push_back(RegionText(region));
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MESH_REGION_UNKNOWN",
@@ -70,6 +71,7 @@ absl::StatusOr<BodyMaterials> MaterialsOf(const worker::v1::WorkerRequest& reque
   }
   if (regions.empty()) return RegionUnknown("materials are given by region", regions);
   std::vector<RegionMaterial> materials;
+  materials.reserve(regions.size());
   std::set<const v1::RegionProperties*> used;
   for (const MeshRegion& region : regions) {
     const v1::RegionProperties* const found = Find(settings.regions(), region);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "proto/cpp/region_properties.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -119,6 +120,15 @@ absl::StatusOr<v1::Material> MatchRegions(const v1::ModalModelHeader& header,
     v1::RegionMaterial& entry = *matched.add_regions();
     entry.set_region(name);
     *entry.mutable_material() = *found;
+  }
+  for (const v1::RegionMaterial& given : resolved.regions()) {
+    const auto is_its = [&](const v1::ModalModelRegion& region) {
+      return given.region().empty() ||
+             absl::EqualsIgnoreCase(region.properties().region(), given.region());
+    };
+    if (std::ranges::any_of(header.regions(), is_its)) continue;
+    return Differs(absl::StrCat("a material is given for the region \"", given.region(),
+                                "\", which the model does not have"));
   }
   return matched;
 }

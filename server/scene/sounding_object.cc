@@ -58,6 +58,7 @@ absl::Status MatchRegions(const ModalModel& model, SoundingMaterial& material) {
               "region its material, or none, and the object gets those of the model");
   }
   std::vector<RegionMaterial> matched;
+  matched.reserve(model.regions.size());
   for (const ModelRegion& region : model.regions) {
     const RegionMaterial* const found = Find(material, region.name);
     if (found == nullptr) {
@@ -83,6 +84,14 @@ absl::Status MatchRegions(const ModalModel& model, SoundingMaterial& material) {
         "\" differs from that of the model by another factor than that of \"",
         model.regions[0].name, "\", or in Poisson's ratio: create a model with these materials"));
   }
+  for (const RegionMaterial& given : material.regions) {
+    const auto is_its = [&](const ModelRegion& region) {
+      return given.region.empty() || absl::EqualsIgnoreCase(region.name, given.region);
+    };
+    if (std::ranges::any_of(model.regions, is_its)) continue;
+    return Differs(absl::StrCat("a material is given for the region \"", given.region,
+                                "\", which the model does not have"));
+  }
   material.regions = std::move(matched);
   return absl::OkStatus();
 }
@@ -90,6 +99,7 @@ absl::Status MatchRegions(const ModalModel& model, SoundingMaterial& material) {
 /// Returns the parts of the energies of each region of the model.
 std::vector<EnergyParts> EnergyPartsOf(const ModalModel& model) {
   std::vector<EnergyParts> parts;
+  parts.reserve(model.regions.size());
   for (const ModelRegion& region : model.regions) {
     parts.push_back({region.strain_energy_parts, region.kinetic_energy_parts});
   }

@@ -40,7 +40,8 @@ absl::StatusOr<fit::ModelLines> LinesOf(const v1::ModalModelSummary& model) {
         absl::StrCat(
             "the model \"", model.label(),
             "\" was made before models said how their frequencies change with Poisson's ratio, "
-            "or elsewhere: delete it (carillon model delete), and create it again of its mesh"));
+            "or elsewhere, or has several materials: delete it (carillon model delete), and create "
+            "it again of its mesh"));
   }
   return fit::ModelLines{
       .poisson_ratio = header.settings().poisson_ratio(),

@@ -28,6 +28,7 @@ RegionMaterial ToRegionMaterial(const std::string& region, const v1::Material& r
 
 std::vector<RegionMaterial> RegionsOf(const v1::Material& resolved) {
   std::vector<RegionMaterial> regions;
+  regions.reserve(static_cast<size_t>(resolved.regions_size()));
   for (const v1::RegionMaterial& entry : resolved.regions()) {
     regions.push_back(ToRegionMaterial(entry.region(), entry.material()));
   }

@@ -160,6 +160,9 @@ TEST(SceneRegistry, RegionsAreScaledByCommonFactorsOnly) {
   properties.material.regions[0].poisson_ratio = 0.21;
   EXPECT_THAT(refusal(ModelOfRegions(), properties), HasSubstr("REGION_MATERIAL_DIFFERS: "));
   EXPECT_THAT(refusal(SmallModel(), properties), HasSubstr("REGION_MATERIAL_DIFFERS: "));
+  properties = PropertiesOfRegions();
+  properties.material.regions.push_back({.region = "none", .poisson_ratio = std::nullopt});
+  EXPECT_THAT(refusal(ModelOfRegions(), properties), HasSubstr("for the region \"none\""));
   EXPECT_THAT(refusal(ModelOfRegions(), SmallProperties()), HasSubstr("REGION_MATERIAL_DIFFERS: "));
 }
 
