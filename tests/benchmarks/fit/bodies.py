@@ -157,8 +157,8 @@ def pink_noise(count, random):
     return numpy.fft.irfft(spectrum / numpy.sqrt(numpy.maximum(hz, 20)), count)
 
 
-def in_room(sound, random, t60_s=0.4, level_db=-8):
-    """With a diffuse tail whose energy is that much below the direct sound's."""
+def in_room(sound, random, t60_s, level_db):
+    """With a diffuse tail whose energy is by `level_db` over the direct sound's."""
     time = numpy.arange(int(t60_s * RATE_HZ)) / RATE_HZ
     tail = random.standard_normal(len(time)) * numpy.exp(-math.log(1000) * time / t60_s)
     tail *= 10 ** (level_db / 20) / numpy.sqrt(numpy.sum(tail**2))
@@ -168,7 +168,8 @@ def in_room(sound, random, t60_s=0.4, level_db=-8):
 
 
 def strike(truth, frequencies, duration_s, noise_db, room, random, keep=None):
-    """The sound of one blow at a random place, at most 20 kHz, as samples of at most 0.9."""
+    """The sound of one blow at a random place, at most 20 kHz, as samples of at most 0.9. `room`: None, or its T60 in s
+    and its level in dB."""
     time = numpy.arange(int(SECONDS * RATE_HZ)) / RATE_HZ
     vertex = random.integers(len(truth.shapes))
     normal = random.standard_normal(3)
@@ -180,7 +181,7 @@ def strike(truth, frequencies, duration_s, noise_db, room, random, keep=None):
         if hz < 20000 and (keep is None or keep[mode]):
             sound += amplitudes[mode] * numpy.exp(-decay[mode] * time) * numpy.sin(2 * math.pi * hz * time)
     if room:
-        sound = in_room(sound, random)
+        sound = in_room(sound, random, *room)
     lead = int(0.3 * RATE_HZ)
     sound = numpy.concatenate([numpy.zeros(lead), sound])
     level = numpy.sqrt(numpy.mean(sound[lead:lead + int(0.1 * RATE_HZ)] ** 2))

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """How well `carillon material fit` finds materials: sounds of bodies whose material is known, the recorded steel bar,
-and recordings held against the mesh of another body.
+a block whose resonances are published, and recordings held against the mesh of another body.
 
-    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--parts table,wrong,bar]
+    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--parts table,wrong,bar,block]
 
 Prints Markdown tables. A sound is the closed form of a struck body whose frequencies are jittered by 0.15 %, which
 stands for what a mesh misses, decomposed at another Poisson's ratio than that of the model.
@@ -30,8 +30,17 @@ ROWS = {f"{name}{noise}{'room' * room}": (span, noise, room)
         for name, span in (("hard", HARD_S), ("soft", SOFT_S))
         for noise, room in ((60, False), (40, False), (20, False), (40, True))}
 STRIKES, JITTER = 2, 0.0015
+ROOM_T60_S, ROOM_LEVEL_DB = (0.25, 0.7), (-12, -6)
 # The bar of ../../../../shared/recordings: its size and its mass.
 BAR_SIZE_M, BAR_MASS_KG, BAR_YOUNG_PA = (0.11436, 0.02544, 0.00312), 0.0713, 214.6e9
+
+# Resonances that Ogi, Sato, Asada and Hirao measured on a block of an aluminium alloy (J. Acoust. Soc. Am. 112, 2553,
+# 2002), kHz, and its constants.
+OGI_SIZE_M, OGI_DENSITY, OGI_C11_PA, OGI_C44_PA = (0.01192, 0.01093, 0.00986), 2788, 109.26e9, 26.72e9
+OGI_KHZ = (116.716, 143.783, 158.081, 166.5, 169.523, 177.846, 183.875, 186.047, 190.341, 197.386, 201.133, 207.386,
+           209.836, 214.753, 223.548, 231.266, 233.538, 234.717, 250.98, 251.256, 252.742, 256.122, 257.595, 258.118,
+           259.035, 268.54, 277.113, 278.762, 282.311, 293.686, 293.686, 293.686, 310.109, 316.197, 317.392, 326.462,
+           329.034, 332.441, 333.364, 336.65, 337.359, 338.276)
 
 
 @dataclasses.dataclass
@@ -134,8 +143,9 @@ def run_row(studio, row):
     outcomes = []
     for number, body, material, nu in cases():
         truth = studio.truth(body, material, nu)
-        random = numpy.random.default_rng(1000 * number + list(ROWS).index(row))
-        files = studio.strikes(row, truth, span, noise_db, room, random)
+        random = numpy.random.default_rng(100000 * room + 1000 * number + list(ROWS).index(row))
+        drawn = (random.uniform(*ROOM_T60_S), random.uniform(*ROOM_LEVEL_DB)) if room else None
+        files = studio.strikes(row, truth, span, noise_db, drawn, random)
         outcomes.append(judge(truth, *studio.fit(studio.model(body, material), *files, "--density", truth.density)))
     return outcomes
 
@@ -163,7 +173,7 @@ def run_wrong(studio):
     for number, body, material, nu in cases():
         truth = studio.truth(body, material, nu)
         random = numpy.random.default_rng(7000 + number)
-        files = studio.strikes("wrong", truth, HARD_S, 40, False, random)
+        files = studio.strikes("wrong", truth, HARD_S, 40, None, random)
         others = [other for other in bodies.BODIES if other != body]
         for other in (others[number % 4], others[(number + 1) % 4]):
             model = studio.model(other, bodies.BODIES[other][1][0])
@@ -229,12 +239,33 @@ def show_bar(studio, recordings):
           f"{100 * answer['rms']:.2f} % apart, log odds {answer['log_odds']:.1f}, {cpu_s:.1f} s of CPU.")
 
 
+def show_block(studio):
+    """Ogi's block, of which frequencies alone are known."""
+    import meshes
+
+    mesh, model, table = (studio.folder / f"block.{suffix}" for suffix in ("obj", "model", "csv"))
+    mesh.write_bytes(meshes.obj(*bodies.box(*OGI_SIZE_M)))
+    subprocess.run([studio.bin / "carillon-precompute", mesh, "--out", model, "--young", "70e9", "--density",
+                    str(OGI_DENSITY), "--poisson", "0.33", "--band", "20:350000", "--accuracy", "0.1%"], check=True,
+                   capture_output=True)
+    name = json.loads(studio.daemon.command("--json", "model", "import", model).stdout)["name"]
+    lame = OGI_C11_PA - 2 * OGI_C44_PA
+    young, nu = OGI_C44_PA * (3 * lame + 2 * OGI_C44_PA) / (lame + OGI_C44_PA), lame / (2 * (lame + OGI_C44_PA))
+    for count, known in ((len(OGI_KHZ), ()), (12, ()), (12, ("--young-range", "69e9:75e9"))):
+        table.write_text("frequency_hz\n" + "".join(f"{1000 * khz:.0f}\n" for khz in OGI_KHZ[:count]))
+        answer, refusal, _ = studio.fit(name, "--modes", table, "--density", OGI_DENSITY, *known)
+        print(f"\nOgi's block by {count} lines{' ' if known else ''}{' '.join(known)}: ", end="")
+        print(refusal if answer is None else
+              f"E {100 * (answer['young_pa'] / young - 1):+.2f} %, nu {answer['poisson_ratio'] - nu:+.4f}, "
+              f"{answer['matched']} matched, {100 * answer['rms']:.2f} % apart, log odds {answer['log_odds']:.1f}.")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, required=True)
     parser.add_argument("--recordings", type=pathlib.Path, default=HERE.parents[3] / "shared/recordings")
     parser.add_argument("--rows", default=",".join(ROWS))
-    parser.add_argument("--parts", default="table,wrong,bar")
+    parser.add_argument("--parts", default="table,wrong,bar,block")
     options = parser.parse_args()
     build = options.build.resolve()
     os.environ["CARILLON_BIN_DIR"] = str(build / "bin")
@@ -250,6 +281,8 @@ def main():
                 show_wrong(studio)
             if "bar" in options.parts:
                 show_bar(studio, options.recordings)
+            if "block" in options.parts:
+                show_block(studio)
         finally:
             studio.daemon.stop()
     print(f"\n{time.monotonic() - started:.0f} s.")
