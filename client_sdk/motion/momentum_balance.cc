@@ -13,7 +13,7 @@ namespace {
 
 /// An island is solved when a sweep gains less than this share of its energy, in J per J. Where the
 /// costs decide, they decide little, and sooner than that is soon enough.
-constexpr double kEndShare = 1e-10, kEndShareOfCosts = 1e-6;
+constexpr double kEndShare = 1e-13, kEndShareOfCosts = 1e-6;
 /// An unknown whose change gains less than this share of the mean rests for some sweeps.
 constexpr double kFaintGain = 0.01;
 constexpr int kRestSweeps = 3;

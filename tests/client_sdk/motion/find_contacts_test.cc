@@ -81,9 +81,10 @@ TEST(FindContacts, TimesOneBounceWhereverItLiesInItsFrame) {
       ASSERT_TRUE(found.ok()) << found.status();
       const std::vector<PairBlow> blows = Clustered(bounce.motion, *found);
       ASSERT_EQ(blows.size(), 1U) << frame_s << " " << first_s;
-      // The ball is faceted, and the places are searched at ten times of a frame at most.
-      EXPECT_NEAR(blows[0].time_s, bounce.time_s, 0.02 * frame_s);
-      EXPECT_NEAR(blows[0].impulse.z(), bounce.impulse, 4e-3 * bounce.impulse);
+      // Nineteen of these bounces are within 0.04 ms and 0.1 %. One lies between two of the ten
+      // times at which a frame is searched, of which only one is taken.
+      EXPECT_NEAR(blows[0].time_s, bounce.time_s, 0.003 * frame_s);
+      EXPECT_NEAR(blows[0].impulse.z(), bounce.impulse, 3e-3 * bounce.impulse);
       EXPECT_LT(found->confidence.unexplained, 3e-4);
     }
   }
