@@ -15,9 +15,9 @@ namespace carillon::motion {
 /// A place, and a time, at which a contact may have acted.
 struct Candidate {
   uint32_t pair = 0;
-  uint32_t frame = 0;       ///< of a load, or at or before a blow
-  uint32_t last_frame = 0;  ///< of a load that lasts while its bodies are still
-  int bin = -1;             ///< of a blow: its time is bin / bin_count of the interval; -1: a load
+  uint32_t frame = 0;       ///< the frame of a load, or the one at or before a blow
+  uint32_t last_frame = 0;  ///< a load lasts until here while its bodies are still
+  int bin = -1;             ///< a blow comes after bin / bin_count of the interval; -1: a load
   ContactFeature feature;
   double slack_m = 0;
   Vector arm_a = Vector::Zero(),
@@ -32,7 +32,7 @@ struct BodyPair {
   double tolerance_m = 0;
   double reduced_mass_kg = 0;
   double friction = 0;
-  double rounding_m = 0;  ///< of both
+  double rounding_m = 0;  ///< the sum of both bodies' roundings
   double offset_m = 0;    ///< the gap at which the engine lets the pair rest
   double nearest_m = 1e300;
 };

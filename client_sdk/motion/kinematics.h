@@ -75,7 +75,7 @@ class BodyMotion {
   double mass_kg_, frame_s_, radius_m_ = 0;
   Vector gravity_, centre_m_;
   Inertia inertia_;
-  std::vector<BodyPose> places_;  ///< of the centre of mass
+  std::vector<BodyPose> places_;  ///< where the centre of mass is at each frame
   std::vector<Vector> turn_;      ///< rotation vector of each interval
   /// Angular momentum at the beginning and at the end of each interval.
   std::vector<Vector> start_, end_;

@@ -29,7 +29,7 @@ struct Unknown {
   Vector arm_a = Vector::Zero(), arm_b = Vector::Zero();
   Vector normal = Vector::Zero();  ///< from b to a; the axis of a joint's torque
   double friction = 0;
-  double cost = 0;  ///< of the normal component, m/s
+  double cost = 0;  ///< what 1 N s of the normal component costs, m/s
   std::array<Node, 5> nodes{};
   int node_count = 0;
 
@@ -76,7 +76,8 @@ class MomentumBalance {
   struct Row {
     double inverse_mass = 0;  ///< zero: no such node
     Matrix inverse_inertia = Matrix::Zero();
-    Vector velocity = Vector::Zero(), angular = Vector::Zero();  ///< of b - A x, by m and I
+    Vector velocity = Vector::Zero(),
+           angular = Vector::Zero();  ///< what b - A x lacks, divided by m and I
     double given = 0;
   };
   struct Active {
@@ -85,12 +86,12 @@ class MomentumBalance {
     double largest = 0;  ///< bound of the eigenvalues of the Hessian
     uint32_t island = 0;
     int rests = 0;                      ///< sweeps that leave it out, because it hardly changed
-    Vector step = Vector::Zero();       ///< of the last sweep
-    Vector direction = Vector::Zero();  ///< of the sweeps before
+    Vector step = Vector::Zero();       ///< what the last sweep changed
+    Vector direction = Vector::Zero();  ///< what the sweeps before changed
   };
   struct Island {
-    size_t first = 0, count = 0;  ///< of the active unknowns
-    double energy = 0;            ///< of b at its nodes, J
+    size_t first = 0, count = 0;  ///< which of the active unknowns
+    double energy = 0;            ///< what b has at its nodes, J
   };
   Row& row(int body, size_t frame) { return rows_[static_cast<size_t>(body) * frames_ + frame]; }
   const Row& row(int body, size_t frame) const {

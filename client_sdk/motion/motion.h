@@ -53,7 +53,7 @@ struct Joint {
   size_t body = 0;
   int other = -1;                    ///< the second body; -1: the scene
   Vector anchor_m = Vector::Zero();  ///< in the first body's frame
-  Vector axis = Vector::UnitZ();     ///< of a hinge, in the first body's frame
+  Vector axis = Vector::UnitZ();     ///< a hinge turns about it, in the first body's frame
   JointKind kind = JointKind::kBall;
 };
 
@@ -85,7 +85,7 @@ struct ContactPoint {
 struct FoundBlow : ContactPoint {
   double time_s = 0;                               ///< since frame `frame`
   Vector impulse_newton_seconds = Vector::Zero();  ///< in the scene's axes
-  Turn orientation_a = Turn::Identity();           ///< of a at the time of the blow
+  Turn orientation_a = Turn::Identity();           ///< how a lies at the time of the blow
   Turn orientation_b = Turn::Identity();
   /// Share of the impulse that other solutions, which explain the motion as well, do not have.
   double ambiguity = 0;
@@ -108,8 +108,8 @@ struct Confidence {
   double ambiguity = 0;
   size_t worst_body = 0;  ///< whose momentum is least explained
   size_t worst_frame = 0;
-  double nearest_gap_m = 0;   ///< of any surface to the worst body at that frame
-  double worst_radius_m = 0;  ///< of the worst body
+  double nearest_gap_m = 0;   ///< from the worst body to any other at that frame
+  double worst_radius_m = 0;  ///< how large the worst body is
 };
 
 /// The contacts that explain a motion.

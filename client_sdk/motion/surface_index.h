@@ -20,7 +20,7 @@ struct NearestPoint {
 struct SharpEdge {
   Vector from_m = Vector::Zero(), to_m = Vector::Zero();
   Vector normal = Vector::Zero();  ///< the mean of both faces'
-  double spread_cosine = 1;        ///< of the angle between that mean and each face's normal
+  double spread_cosine = 1;        ///< between that mean and each face's normal
 };
 
 /// The surface of a body, prepared for the search of contacts. It is not thread-safe to move, but
