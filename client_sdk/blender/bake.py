@@ -40,7 +40,8 @@ class Bake:
         self.process = subprocess.Popen(
             [bpy.app.binary_path, "--background", "--factory-startup", *scripts, os.fspath(copy),
              "--python-exit-code", "1", "--python-expr", code],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.log, text=True, start_new_session=True)
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.log, text=True, start_new_session=True,
+            env=os.environ | {"TMPDIR": os.fspath(self.folder)})  # so that nothing is left of a bake that is ended
         self.lines = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
 
