@@ -19,7 +19,8 @@ REASONS = {
                re.compile(rf"\breason\s*[!=]==?\s*{QUOTED}")),
 }
 WARNINGS = {
-    "cxx": (re.compile(rf'\bAdd\(\s*warnings,\s*"{NAME}"'), re.compile(rf'set_id\("{NAME}"\)')),
+    "cxx": (re.compile(rf'\bAdd\(\s*warnings,\s*"{NAME}"'), re.compile(rf'set_id\("{NAME}"\)'),
+            re.compile(rf'^    {{"{NAME}", "', re.MULTILINE)),  # the rows of kMistakes
     "client": (re.compile(rf"\bid(?:=|: ){QUOTED}"),),
 }
 MENTION = re.compile(rf'"{NAME}(?:: |")')

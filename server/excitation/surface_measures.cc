@@ -24,12 +24,15 @@ double AreaM2(std::span<const std::array<float, 3>> vertices,
   return sum;
 }
 
-double VolumeM3(std::span<const std::array<float, 3>> vertices,
-                std::span<const std::array<uint32_t, 3>> triangles) {
-  double sum = 0;
-  if (triangles.empty()) return 0;
-  // The volumes of tetrahedra are summed from a vertex of the surface, because rounding errors are
-  // smallest there.
+namespace {
+
+/// Calls `take` with six times the signed volume of each triangle's tetrahedron, and with the sum
+/// of its corners. The tetrahedra stand on a vertex of the surface, because rounding errors are
+/// smallest there; that vertex is the origin.
+template <typename Take>
+void ForEachTetrahedron(std::span<const std::array<float, 3>> vertices,
+                        std::span<const std::array<uint32_t, 3>> triangles, const Take& take) {
+  if (triangles.empty()) return;
   const std::array<float, 3>& origin = vertices[triangles[0][0]];
   const auto from_origin = [&](uint32_t vertex) {
     std::array<double, 3> v{};
@@ -39,10 +42,40 @@ double VolumeM3(std::span<const std::array<float, 3>> vertices,
   for (const std::array<uint32_t, 3>& triangle : triangles) {
     const auto a = from_origin(triangle[0]), b = from_origin(triangle[1]),
                c = from_origin(triangle[2]);
-    sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-           a[2] * (b[0] * c[1] - b[1] * c[0]);
+    take(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+             a[2] * (b[0] * c[1] - b[1] * c[0]),
+         std::array<double, 3>{a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]});
   }
+}
+
+}  // namespace
+
+double VolumeM3(std::span<const std::array<float, 3>> vertices,
+                std::span<const std::array<uint32_t, 3>> triangles) {
+  double sum = 0;
+  ForEachTetrahedron(vertices, triangles,
+                     [&sum](double six_volumes, const auto&) { sum += six_volumes; });
   return std::abs(sum) / 6;
+}
+
+std::array<double, 3> CentreM(std::span<const std::array<float, 3>> vertices,
+                              std::span<const std::array<uint32_t, 3>> triangles) {
+  double sum = 0;
+  std::array<double, 3> moment{}, centre{};
+  ForEachTetrahedron(vertices, triangles, [&](double six_volumes, const auto& corners) {
+    sum += six_volumes;
+    for (size_t i = 0; i < 3; ++i) moment[i] += six_volumes * corners[i] / 4;
+  });
+  for (size_t i = 0; i < 3; ++i) {
+    if (sum != 0) {
+      centre[i] = double{vertices[triangles[0][0]][i]} + moment[i] / sum;
+      continue;
+    }
+    for (const auto& vertex : vertices) {
+      centre[i] += double{vertex[i]} / static_cast<double>(vertices.size());
+    }
+  }
+  return centre;
 }
 
 double ExtentM(std::span<const std::array<float, 3>> vertices) {

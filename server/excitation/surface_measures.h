@@ -12,6 +12,11 @@ namespace carillon {
 double VolumeM3(std::span<const std::array<float, 3>> vertices,
                 std::span<const std::array<uint32_t, 3>> triangles);
 
+/// Returns the centre of mass of the homogeneous body inside a closed surface, metres, or that of
+/// the vertices for a surface that encloses no volume.
+std::array<double, 3> CentreM(std::span<const std::array<float, 3>> vertices,
+                              std::span<const std::array<uint32_t, 3>> triangles);
+
 /// Returns the area of the triangles, m^2.
 double AreaM2(std::span<const std::array<float, 3>> vertices,
               std::span<const std::array<uint32_t, 3>> triangles);

@@ -24,10 +24,16 @@ constexpr double kUndecidedS = 0.04;
 constexpr double kLoadS = 0.01;
 /// Blows that are farther apart than this are heard one by one, not as a tone.
 constexpr double kLastingS = 0.1;
-/// A client has made a mistake if kManyChanges steps have no common partner, and if these steps are
-/// the share kMostChanges of the steps in contact.
-constexpr uint64_t kManyChanges = 10;
-constexpr double kMostChanges = 0.8;
+/// A body at rest gets the acceleration of gravity, 9.81 m/s^2, and twice that in each second step.
+/// In some games gravity is twice as great as on Earth.
+constexpr double kFeebleMPerS2 = 2.5 * 9.81;
+/// Part of the impulses of a load that rounding may leave of it.
+constexpr double kRounding = 1e-9;
+/// A contact that is lost for a shorter time than this flickers, seconds.
+constexpr double kLostS = 0.01;
+/// A load continues with another partner if the cosine of its change of direction is greater than
+/// this, and if it does not grow more than the jitter of a load, see LoadTracker.
+constexpr double kLeastCosine = 0.7, kMostGrowth = 3;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
   for (float& component : vector) component *= static_cast<float>(factor);
@@ -36,6 +42,10 @@ std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
 
 double Magnitude(const std::array<float, 3>& vector) {
   return std::hypot(double{vector[0]}, double{vector[1]}, double{vector[2]});
+}
+
+double Dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /// Returns a number from 0 to 1 that looks random but depends only on the arguments, by
@@ -60,6 +70,8 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
     const double missing_count = std::ceil(since_s / nominal_step_s_ - kLongestStep);
     EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount));
   }
+  if (!time_s_) first_time_s_ = time_s;
+  gap_s_ = since_s;
   step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
   previous_time_s_ = std::exchange(time_s_, time_s);
   return events_;
@@ -68,7 +80,7 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
 void BlowGatherer::EndBeforeGap(double missing_count) {
   int steps = 0;
   step_s_ = nominal_step_s_;
-  for (; steps < std::min<double>(missing_count, kKnotsToEnd) && (!objects_.empty() || gathers());
+  for (; steps < missing_count && ((steps < kKnotsToEnd && !objects_.empty()) || gathers());
        ++steps) {
     *time_s_ += step_s_;
     EndStep();
@@ -109,6 +121,7 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
   added.bodies = bodies;
   for (const Felt& felt : impulse.all()) {
     added.parts[added.part_count++] = {.handle = felt.handle,
+                                       .mass_kg = felt.mass_kg,
                                        .serial = felt.serial,
                                        .impulse = felt.impulse(),
                                        .collision = felt.collision};
@@ -127,7 +140,8 @@ BlowGatherer::Events BlowGatherer::End() {
 
 void BlowGatherer::EndStep() {
   PairTouches();
-  if (follows_) CountPartners();
+  FollowPartners();
+  motions_.clear();
   for (Pair& pair : pairs_) Divide(pair);
   std::erase_if(pairs_, [](const Pair& pair) { return pair.load.idle() && !pair.blow.begun(); });
   touches_.clear();
@@ -185,45 +199,116 @@ void BlowGatherer::SendForces() {
   forces_.clear();
 }
 
-void BlowGatherer::CountPartners() {
-  std::vector<uint32_t> changed;
-  bool stay = false, change_again = false;
-  for (auto pair = pairs_.begin(); pair != pairs_.end();) {
-    const uint32_t handle = pair->bodies.first;
-    bool touches = false, touched = false, stays = false;
-    for (; pair != pairs_.end() && pair->bodies.first == handle; ++pair) {
-      const bool now = std::ranges::any_of(
-          pair->touches, [](const PairTouch& touch) { return touch.magnitude > 0; });
-      const bool before = pair->touched_s && pair->touched_s == previous_time_s_;
-      touches = touches || now;
-      touched = touched || before;
-      stays = stays || (now && before);
+void BlowGatherer::FollowPartners() {
+  std::vector<std::pair<uint32_t, Pair*>> ceased;
+  bool begins = false;
+  for (Pair& pair : pairs_) {
+    begins = begins || (!pair.touches.empty() && !pair.touched_s);
+    if (!pair.touches.empty() || !pair.touched_s || pair.touched_s != previous_time_s_) continue;
+    for (const Motion& given : pair.given) {
+      if (given.mass_kg > 0) ceased.emplace_back(given.handle, &pair);
     }
-    if (!touches || !touched) continue;
-    stay = true;
-    if (stays) continue;
-    changed.push_back(handle);
-    change_again = change_again || std::ranges::binary_search(changed_, handle);
   }
-  stays_in_contact_count_ += stay ? 1 : 0;
-  counts_.changed_partner_count += change_again ? 1 : 0;
-  changed_ = std::move(changed);
+  if (!begins || ceased.empty()) return;
+  std::ranges::sort(ceased);
+  for (Pair& pair : pairs_) {
+    if (pair.touches.empty() || pair.touched_s) continue;
+    for (const Part& part : pair.touches.front().all()) {
+      auto found =
+          std::ranges::lower_bound(ceased, part.handle, {}, &std::pair<uint32_t, Pair*>::first);
+      const auto is_same = [&] { return found != ceased.end() && found->first == part.handle; };
+      while (is_same() && !Continues(*found->second, pair)) ++found;
+      if (!is_same()) continue;
+      pair.load = std::exchange(found->second->load, {});
+      pair.blow = std::exchange(found->second->blow, {});
+      pair.touched_s = std::exchange(found->second->touched_s, std::nullopt);
+      break;
+    }
+  }
 }
 
-BlowCounts BlowGatherer::counts() const {
-  BlowCounts counts = counts_;
-  const auto most = kMostChanges * static_cast<double>(stays_in_contact_count_);
-  if (counts.changed_partner_count < kManyChanges ||
-      static_cast<double>(counts.changed_partner_count) < most) {
-    counts.changed_partner_count = 0;
+bool BlowGatherer::Continues(const Pair& before, const Pair& now) {
+  if (!before.touched_s) return false;  // another pair continues it
+  for (const Motion& is : GivenBy(now.touches)) {
+    for (const Motion& was : before.given) {
+      if (is.mass_kg == 0 || was.mass_kg == 0 || is.handle != was.handle) continue;
+      const double grown = std::sqrt(Dot(is.impulse, is.impulse) / Dot(was.impulse, was.impulse));
+      const double along = Dot(is.impulse, was.impulse) / Dot(was.impulse, was.impulse);
+      return grown <= kMostGrowth && along >= kLeastCosine * grown;
+    }
   }
-  return counts;
+  return false;
+}
+
+std::array<BlowGatherer::Motion, 2> BlowGatherer::GivenBy(std::span<const PairTouch> touches) {
+  std::array<Motion, 2> given{};
+  for (const PairTouch& touch : touches) {
+    for (size_t i = 0; i < touch.part_count; ++i) {
+      given[i].handle = touch.parts[i].handle;
+      given[i].mass_kg = touch.parts[i].mass_kg;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        given[i].impulse[axis] += touch.parts[i].impulse.impulse_newton_seconds[axis];
+      }
+    }
+  }
+  return given;
+}
+
+void BlowGatherer::AddUpMotions() {
+  for (const PairTouch& touch : touches_) {
+    for (const Motion& given : GivenBy(std::span(&touch, 1))) {
+      if (given.mass_kg > 0) motions_.push_back(given);
+    }
+  }
+  std::ranges::sort(motions_, {}, &Motion::handle);
+  size_t count = 0;
+  for (const Motion& motion : motions_) {
+    if (count == 0 || motions_[count - 1].handle != motion.handle) {
+      motions_[count++] = motion;
+      continue;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+      motions_[count - 1].impulse[axis] += motion.impulse[axis];
+    }
+  }
+  motions_.resize(count);
+}
+
+bool BlowGatherer::IsFeeble(const Pair& pair) {
+  if (motions_.empty()) AddUpMotions();
+  return std::ranges::all_of(GivenBy(pair.touches), [this](const Motion& given) {
+    if (given.mass_kg == 0) return true;
+    const Motion& sum = *std::ranges::lower_bound(motions_, given.handle, {}, &Motion::handle);
+    const double most = kFeebleMPerS2 * step_s_ * given.mass_kg;
+    return Dot(sum.impulse, sum.impulse) <= most * most;
+  });
+}
+
+bool BlowGatherer::MayFlicker(const Pair& pair) const {
+  const double since_s = *time_s_ - std::max(first_time_s_, pair.touched_s.value_or(first_time_s_));
+  return since_s <= (MostLostSteps() + 1.5) * nominal_step_s_;
+}
+
+int BlowGatherer::MostLostSteps() const {
+  constexpr double kFewest = 1, kMost = 4;
+  return static_cast<int>(std::clamp(std::ceil(kLostS / step_s_), kFewest, kMost));
+}
+
+bool BlowGatherer::MayFollow() const {
+  return !previous_time_s_ || gap_s_ <= (MostLostSteps() + 0.5) * nominal_step_s_;
 }
 
 BlowGatherer::Events BlowGatherer::Finish() {
   events_.clear();
   for (Pair& pair : pairs_) {
-    if (pair.blow.begun()) SendBlow(pair, 0);
+    Blow& blow = pair.blow;
+    if (!blow.begun()) continue;
+    if (blow.feeble && blow.lasting) {
+      CountAsLoad(blow);
+      continue;
+    }
+    const bool rests = blow.feeble && blow.steps.size() > 1 && blow.lost_steps == 0;
+    SendBlow(pair, rests ? blow.steps.back().force : 0);
   }
   return events_;
 }
@@ -243,21 +328,43 @@ void BlowGatherer::Divide(Pair& pair) {
   }
   const bool undecided = pair.blow.begun() && *time_s_ - pair.blow.begin_s >= kUndecidedS;
   double remains = 0;
-  if (pair.blow.begun() && IsOver(pair.blow, force, share * impulse, remains)) {
+  Blow& blow = pair.blow;
+  if (Flickers(blow, force)) share = 0;
+  if (blow.begun() && IsOver(blow, force, share * impulse, remains)) {
     SendBlow(pair, remains);
     share = 0;
   } else if (share > 0) {
-    if (!pair.blow.begun()) pair.blow.load_newtons = (1 - share) * force;
+    if (!blow.begun()) {
+      blow.load_newtons = (1 - share) * force;
+      blow.feeble = MayFlicker(pair) && IsFeeble(pair);
+      blow.lost_steps = 0;
+    }
     Gather(pair, force, share * impulse);
-    if (!follows_) SendBlow(pair, 0);
+    if (!follows_ && !(blow.feeble && MayFollow())) SendBlow(pair, 0);
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
   if (undecided) share = 0;
   for (const PairTouch& touch : pair.touches) {
     for (const Part& part : touch.all()) Add(part, (1 - share) / step_s_, touch.roughness);
   }
-  if (force > 0) pair.touched_s = time_s_;
+  if (force > 0) {
+    pair.touched_s = time_s_;
+    pair.given = GivenBy(pair.touches);
+  }
   pair.touches = {};
+}
+
+void BlowGatherer::CountAsLoad(Blow& blow) {
+  counts_.load_count += blow.steps.size() * blow.touches.size();
+  blow.steps.clear();
+}
+
+bool BlowGatherer::Flickers(Blow& blow, double force_newtons) {
+  if (!blow.begun() || !blow.feeble) return false;
+  const bool returns = force_newtons > 0 && blow.lost_steps > 0;
+  if (returns) CountAsLoad(blow);
+  blow.lost_steps = force_newtons > 0 ? 0 : blow.lost_steps + 1;
+  return returns;
 }
 
 void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) const {
@@ -277,6 +384,7 @@ void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) cons
 
 bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse,
                           double& remains) const {
+  if (blow.lost_steps > 0) return blow.lost_steps > MostLostSteps();
   if (impulse <= blow.greatest() / 4) return true;
   remains = force_newtons;
   if (*time_s_ - blow.begin_s >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps) return true;
@@ -288,10 +396,13 @@ bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse
 void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   Blow& blow = pair.blow;
   const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
-  double impulse = 0;
-  for (const Blow::Step& step : blow.steps) impulse += std::max(step.impulse - excess, 0.0);
+  double impulse = 0, all = 0;
+  for (const Blow::Step& step : blow.steps) {
+    impulse += step.impulse - excess;
+    all += step.impulse;
+  }
+  if (!(impulse > kRounding * all)) return CountAsLoad(blow);
   blow.steps.clear();
-  if (!(impulse > 0)) return;
   ++counts_.blow_count;
   double whole = 0;
   for (const PairTouch& touch : blow.touches) whole += touch.magnitude;

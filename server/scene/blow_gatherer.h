@@ -23,10 +23,6 @@ namespace carillon {
 struct BlowCounts {
   uint64_t blow_count = 0;  ///< blows; a blow may span several steps
   uint64_t load_count = 0;  ///< contacts that were only loads, counted in each step
-  /// Steps in which an object in contact touches none of its partners of the step before, as in the
-  /// step before, too. Zero unless there are at least ten, four fifths of all steps in which an
-  /// object stays in contact.
-  uint64_t changed_partner_count = 0;
 };
 
 /// An action on an object at a simulation time.
@@ -64,6 +60,17 @@ struct ForceEvent {
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.
 ///
+/// An impulse that changes the speed of its bodies by hardly more than gravity does in a step may
+/// be the load of a body that rests when the simulation begins, or whose contact flickers. In the
+/// first steps of a simulation, or shortly after the last contact, such a feeble blow is not over
+/// before its contact has been lost for some steps, and is a load if the contact returns before
+/// that. Others, after a flight, need not wait.
+///
+/// A body that slides from one partner to the next, such as over the tiles of a floor, takes its
+/// load along. If a pair begins to touch in the step in which another pair of the same body
+/// ceases to, with a force in the same direction and no more than three times as great, the new
+/// pair continues the old one.
+///
 /// An engine reports the step of a blow, not the time within the step. Blows of two bodies that
 /// slide, roll or hop would therefore sound on the grid of the steps, as tones at multiples of the
 /// step rate. A blow of two bodies that touched within 0.1 s before it is sent at a random time
@@ -95,7 +102,7 @@ class BlowGatherer {
   bool HasRoom(const ObjectTouch& touch) const;
 
   /// Adds a contact that may be a blow or a load to this step. `impulse` has the impulses that the
-  /// objects of `touch` feel.
+  /// objects of `touch` feel; they must not be zero.
   void Touch(const ObjectTouch& touch, const FeltContact& impulse);
 
   /// Ends the step and returns its events.
@@ -104,7 +111,7 @@ class BlowGatherer {
   /// Ends the simulation. Returns the blows that are not over yet.
   Events Finish();
 
-  BlowCounts counts() const;
+  BlowCounts counts() const { return counts_; }
 
  private:
   using Bodies = std::pair<uint32_t, uint32_t>;  // handle of the object, number of the partner
@@ -125,6 +132,7 @@ class BlowGatherer {
   /// The impulse of a contact on one of its objects.
   struct Part {
     uint32_t handle = 0;
+    double mass_kg = 1;  // of the object
     uint64_t serial = 0;
     SurfaceImpulse impulse;
     Collision collision{};
@@ -141,6 +149,12 @@ class BlowGatherer {
     std::span<const Part> all() const { return std::span(parts).first(part_count); }
   };
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, double scale);
+  /// The sum of impulses on an object, N s, in the object's frame.
+  struct Motion {
+    uint32_t handle = 0;
+    double mass_kg = 0;  // zero: there is no such object
+    std::array<double, 3> impulse{};
+  };
   /// The steps of a blow that is not over yet, or none.
   struct Blow {
     struct Step {
@@ -153,6 +167,8 @@ class BlowGatherer {
     size_t strongest = 0;              // index of the step with the greatest impulse
     std::vector<PairTouch> touches{};  // touches of that step
     bool lasting = false;              // whether the bodies touched shortly before the blow
+    bool feeble = false;               // whether its first step may have been a load
+    int lost_steps = 0;                // steps since a feeble blow lost its contact
 
     bool begun() const { return !steps.empty(); }
     double greatest() const { return steps.empty() ? 0 : steps[strongest].impulse; }
@@ -162,14 +178,27 @@ class BlowGatherer {
     LoadTracker load{};
     std::span<const PairTouch> touches{};            // of this step, in touches_
     std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
+    std::array<Motion, 2> given{};                   // what it gave its objects in the last touch
     Blow blow{};
   };
 
   void EndStep();
   /// Makes the pairs that touch for the first time, and gives each pair its touches of this step.
   void PairTouches();
-  /// Counts this step if objects stay in contact in it, and if some of them keep no partner again.
-  void CountPartners();
+  /// Lets pairs that begin to touch continue those of the same objects that cease to.
+  void FollowPartners();
+  static bool Continues(const Pair& before, const Pair& now);
+  static std::array<Motion, 2> GivenBy(std::span<const PairTouch> touches);
+  /// Returns whether this step changes the speed of no object of the pair by much more than gravity
+  /// does.
+  bool IsFeeble(const Pair& pair);
+  /// Returns whether the pair touched shortly before, or may have done so before the simulation.
+  bool MayFlicker(const Pair& pair) const;
+  /// Fills in motions_ for this step.
+  void AddUpMotions();
+  int MostLostSteps() const;
+  /// Returns whether the step, which follows no other, may be one of a simulation without gaps.
+  bool MayFollow() const;
   /// Ends the forces, and lets `missing_count` steps without contact pass.
   void EndBeforeGap(double missing_count);
   /// Adds a force to this step: the impulse of `part`, N s, times `per_second`, 1/s.
@@ -178,6 +207,11 @@ class BlowGatherer {
   void SendForces();
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(Pair& pair);
+  /// Adds a step's force to the time for which a feeble blow has lost its contact. Returns whether
+  /// the contact returns before the blow is over, so that there was no blow.
+  bool Flickers(Blow& blow, double force_newtons);
+  /// Ends what turned out to be a load.
+  void CountAsLoad(Blow& blow);
   /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
   /// first step.
   void Gather(Pair& pair, double force_newtons, double impulse) const;
@@ -195,16 +229,17 @@ class BlowGatherer {
   double step_s_ = 0;  // time since the previous step
   std::optional<double> time_s_;
   std::optional<double> previous_time_s_;
-  std::vector<Force> forces_;            // of this step
-  std::vector<Object> objects_;          // ascending by handle
-  std::vector<PairTouch> touches_;       // of this step
-  std::vector<Pair> pairs_;              // ascending by bodies
-  std::set<Bodies> new_pairs_;           // pairs of this step that are not in pairs_ yet
-  std::vector<ForceEvent> events_;       // those of the last call
-  bool follows_ = false;                 // whether no step is missing before this step
-  BlowCounts counts_;                    // changed_partner_count without its conditions
-  uint64_t stays_in_contact_count_ = 0;  // steps with an object that touched in the step before
-  std::vector<uint32_t> changed_;        // ascending; objects that kept no partner in the last step
+  std::vector<Force> forces_;       // of this step
+  std::vector<Object> objects_;     // ascending by handle
+  std::vector<PairTouch> touches_;  // of this step
+  std::vector<Pair> pairs_;         // ascending by bodies
+  std::set<Bodies> new_pairs_;      // pairs of this step that are not in pairs_ yet
+  std::vector<ForceEvent> events_;  // those of the last call
+  bool follows_ = false;            // whether no step is missing before this step
+  std::vector<Motion> motions_;     // ascending; of this step, if it was asked for
+  double gap_s_ = 0;                // time since the previous step that was sent
+  double first_time_s_ = 0;
+  BlowCounts counts_;
 };
 
 }  // namespace carillon

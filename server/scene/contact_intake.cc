@@ -46,6 +46,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       time_s_(mapper_.mapping().first_time_s),
       diagnostics_(settings.step_s, settings.rejections),
       gatherer_(settings.step_s),
+      balance_(settings.step_s, settings.reading.scene_frame),
       pose_times_(settings.step_s) {}
 
 absl::Status ContactIntake::BeginStep(double time_s) {
@@ -148,6 +149,10 @@ void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
 absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   RETURN_IF_ERROR(Validate(touch.roughness));
   RETURN_IF_ERROR(FrameOfImpulse(touch.time_offset_s).status());
+  if (diagnostics_.NoteZero(touch.contact)) {
+    balance_.TouchWithout(touch.contact.handle);
+    return scene_.Find(touch.contact.handle).status();
+  }
   if (!gatherer_.HasRoom(touch)) {
     return Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CONTACTS",
                    absl::StrCat("a step has more than ", BlowGatherer::kMostTouches,
@@ -156,7 +161,13 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   }
   FeltContact felt;
   RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, felt));
-  diagnostics_.NoteZero(touch.contact);
+  for (const Felt& one : felt.all()) {
+    balance_.Touch({.handle = one.handle,
+                    .mass_kg = one.mass_kg,
+                    .impulse_newton_seconds = one.impulse().impulse_newton_seconds,
+                    .vertices = one.impulse().at.vertices,
+                    .weights = one.impulse().at.weights});
+  }
   gatherer_.Touch(touch, felt);
   return absl::OkStatus();
 }
@@ -169,6 +180,12 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Move(handle, pose));
+  const Quaternion orientation = Normalized(pose.orientation);
+  Vector3 centre = object->body->centre_m;
+  for (double& component : centre) component *= object->properties.material.size;
+  centre = Rotated(centre, orientation);
+  for (size_t axis = 0; axis < 3; ++axis) centre[axis] += pose.position_m[axis];
+  balance_.Move(handle, centre, orientation);
   if (object->voice == nullptr) return absl::OkStatus();
   const double glide_s = pose_times_.GlideS(handle, time_s_);
   MixerEvent move{.bank = object->bank,
@@ -196,6 +213,7 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
 void ContactIntake::EndStep() {
   PushStruck();
   Push(gatherer_.End());
+  balance_.EndStep(time_s_);
 }
 
 void ContactIntake::Finish() {

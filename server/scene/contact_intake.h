@@ -14,6 +14,7 @@
 #include "server/scene/blow_record.h"
 #include "server/scene/diagnostics.h"
 #include "server/scene/due_frame.h"
+#include "server/scene/momentum_balance.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
@@ -126,7 +127,9 @@ class ContactIntake {
   uint64_t rejected_count() const { return diagnostics_.rejected_count(); }
   /// See Diagnostics::last_rejection.
   absl::Status last_rejection() const { return diagnostics_.last_rejection(); }
-  IntakeFindings findings() const { return diagnostics_.findings(gatherer_.counts()); }
+  IntakeFindings findings() const {
+    return diagnostics_.findings(gatherer_.counts(), balance_.mistakes());
+  }
 
  private:
   absl::Status TryStrike(const ObjectImpulse& impulse)
@@ -173,6 +176,7 @@ class ContactIntake {
   Diagnostics diagnostics_;
   StepImpulses struck_;
   BlowGatherer gatherer_;
+  MomentumBalance balance_;
   PoseTimes pose_times_;
   uint64_t step_count_ = 0;
   uint64_t impulse_count_ = 0;

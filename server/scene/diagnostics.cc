@@ -34,9 +34,11 @@ void Diagnostics::NoteForce() {
   findings_.standing_step_count += stands_ ? 1 : 0;
 }
 
-void Diagnostics::NoteZero(const ObjectContact& contact) {
+bool Diagnostics::NoteZero(const ObjectContact& contact) {
   const auto& [x, y, z] = contact.impulse.impulse_newton_seconds;
-  if (x == 0 && y == 0 && z == 0) ++findings_.zero_impulse_count;
+  const bool zero = x == 0 && y == 0 && z == 0;
+  if (zero) ++findings_.zero_impulse_count;
+  return zero;
 }
 
 absl::Status Diagnostics::Examine(std::span<const Felt> felt, const Vector3& vector,
@@ -82,13 +84,15 @@ absl::Status Diagnostics::last_rejection() const {
                                                   : AtTime(last_rejection_, last_rejected_time_s_);
 }
 
-IntakeFindings Diagnostics::findings(const BlowCounts& engine) const {
+IntakeFindings Diagnostics::findings(const BlowCounts& engine,
+                                     const EngineMistakes& mistakes) const {
   IntakeFindings findings = findings_;
   if (findings.standing_step_count < kManyStanding ||
       kStandingPart * findings.standing_step_count < force_step_count_) {
     findings.standing_step_count = 0;
   }
   findings.engine = engine;
+  findings.mistakes = mistakes;
   findings.regular_gap_s = intervals_.RegularGapS();
   return findings;
 }

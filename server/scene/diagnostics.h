@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "server/scene/blow_gatherer.h"
 #include "server/scene/felt_contact.h"
+#include "server/scene/momentum_balance.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/step_intervals.h"
@@ -27,6 +28,7 @@ struct IntakeFindings {
   /// Steps with touches or forces at the time of the step before. Zero unless there are at least
   /// ten, a fifth of all steps with touches or forces.
   uint64_t standing_step_count = 0;
+  EngineMistakes mistakes{};
 };
 
 /// Counts what is unusual about the contacts of a simulation, and which contacts are rejected. Only
@@ -44,7 +46,8 @@ class Diagnostics {
   /// Counts the step of a touch or a force.
   void NoteForce();
 
-  void NoteZero(const ObjectContact& contact);
+  /// Counts a contact without an impulse. Returns whether it is one.
+  bool NoteZero(const ObjectContact& contact);
 
   /// Counts unusual properties of a contact. `vector` is its impulse, or a force that lasts for
   /// `seconds`. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
@@ -59,7 +62,7 @@ class Diagnostics {
   /// OK if no contact was rejected.
   absl::Status last_rejection() const;
 
-  IntakeFindings findings(const BlowCounts& engine) const;
+  IntakeFindings findings(const BlowCounts& engine, const EngineMistakes& mistakes) const;
 
  private:
   void NoteSpeedChange(double speed_m_per_s);

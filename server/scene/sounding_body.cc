@@ -68,6 +68,7 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
       .curvature = std::move(curvature),
       .edges = edges,
       .volume_m3 = of.regions.empty() ? VolumeM3(of.vertices, of.triangles) : of.mass_kg,
+      .centre_m = CentreM(of.vertices, of.triangles),
       .extent_m = ExtentM(of.vertices)});
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <future>
 #include <map>
 #include <memory>
@@ -27,6 +28,8 @@ struct SoundingBody {
   /// Volume at the model's size, or zero if unknown. For a body of several materials, the volume of
   /// the reference material that has the body's mass.
   double volume_m3 = 0;
+  /// Centre of mass of a body of one material at the model's size.
+  std::array<double, 3> centre_m{};
   double extent_m = 0;  ///< the diagonal of the bounding box at the model's size
 };
 

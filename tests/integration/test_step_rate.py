@@ -87,13 +87,14 @@ class StepRateTest(DaemonTest):
                 print(f"{self.id().rsplit('.')[-1]}, {rate_hz} Hz: lines {lines:+.1f} dB, level "
                       f"{sound.level_db(slides):.1f} dB, {blows} blows", flush=True)
                 self.assertLess(lines, LIMIT_DB)
-                self.assertEqual(blows > 3, struck)
+                if struck is not None:
+                    self.assertEqual(blows > 3, struck)
 
     def test_a_slide_with_a_jitter_over_jumping_points(self):
         self.assert_no_lines(jittering, 0.5, struck=False)
 
     def test_a_slide_that_loses_contact_for_single_steps(self):
-        self.assert_no_lines(vanishing, 0.5)
+        self.assert_no_lines(vanishing, 0.5, struck=None)
 
     def test_a_slide_that_hops_every_fifth_step(self):
         self.assert_no_lines(lambda rng, count: hopping(rng, count, [4]), 0)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/convert/contact_warnings.h"
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
@@ -15,6 +17,8 @@ using Warnings = google::protobuf::RepeatedPtrField<v1::Warning>;
 
 /// Time by which a simulation in real time may run ahead.
 constexpr double kUsualLeadS = 0.25;
+/// Contacts without an impulse are a waste if there are so many, and this many times the others.
+constexpr uint64_t kManyZeros = 1000, kMostZeros = 10;
 
 v1::Warning& Add(Warnings& warnings, const char* id, uint64_t count, std::string text) {
   v1::Warning& warning = *warnings.Add();
@@ -36,7 +40,7 @@ std::string Were(uint64_t count) {
   return absl::StrCat(Counted(count, "contact"), count == 1 ? " was" : " were");
 }
 
-/// Adds the warnings about the times of steps and about partners, by which bodies at rest strike.
+/// Adds the warnings about the times of steps.
 void AddStepWarnings(const IntakeFindings& findings, Warnings& warnings) {
   if (findings.regular_gap_s > 0) {
     v1::Warning& warning = Add(
@@ -53,36 +57,89 @@ void AddStepWarnings(const IntakeFindings& findings, Warnings& warnings) {
                      " steps with contacts had the time of the step before; give each step the "
                      "simulation's time, in seconds"));
   }
-  if (const uint64_t count = findings.engine.changed_partner_count; count > 0) {
-    Add(warnings, "PARTNERS_CHANGE", count,
-        absl::StrCat("in ", count,
-                     " steps an object in contact touched none of its partners of the step "
-                     "before, so that a body at rest strikes in each of them; give a body the "
-                     "same partner in each step, such as the engine's number of that body"));
+}
+
+/// The warning about a mistake of an engine.
+struct MistakeText {
+  const char* id;
+  const char* nouns;    // what the count counts
+  const char* meaning;  // follows the count
+};
+
+/// By EngineMistake.
+constexpr std::array<MistakeText, kEngineMistakeCount> kMistakes{{
+    {"IMPULSES_ARE_FORCES", "blows or steps of loads",
+     "forces in place of impulses; give newton seconds, which are newtons times the step"},
+    {"CONTACTS_TWICE", "blows or contacts",
+     "each contact twice; leave out the second report of each pair, such as (b, a) beside (a, b)"},
+    {"CONTACTS_STALE", "steps",
+     "the impulse of an earlier step again, though the body does not feel it; send an impulse only "
+     "in the step in which the engine computed it"},
+    {"LAST_SUBSTEP_ONLY", "blows or steps of loads",
+     "the impulses of the last substep alone; add up those of all substeps, or send each as a "
+     "step"},
+    {"IMPULSES_REVERSED", "blows or steps of loads",
+     "the impulse on the other body; change its sign"},
+    {"IMPULSES_IN_OTHER_FRAME", "blows",
+     "impulses in another frame than the stated one; turn them, or state the frame of the scene or "
+     "of the object"},
+    {"CONTACTS_ONE_STEP_LATE", "blows",
+     "impulses that acted a step or two before; read them before the next step begins"},
+    {"FIRST_IMPULSES_ZERO", "blows",
+     "no impulse in the step in which the contact begins; read impulses after the engine has "
+     "solved its step"},
+    {"MASSES_DIFFER", "blows",
+     "impulses on a body of another mass than the object's; give the engine the mass of the model, "
+     "or the object the engine's density"},
+}};
+
+/// Adds the warnings about the engine's mistakes, by which the motion contradicts the impulses.
+void AddMistakes(const IntakeFindings& findings, Warnings& warnings) {
+  for (size_t i = 0; i < kMistakes.size(); ++i) {
+    const MistakeSize& size = findings.mistakes[i];
+    if (size.count == 0) continue;
+    std::string ratio;
+    if (size.ratio > 0) ratio = absl::StrFormat(", %.3g times the true impulses", size.ratio);
+    v1::Warning& warning = Add(
+        warnings, kMistakes[i].id, size.count,
+        absl::StrCat("by the balance of momentum, ", size.count, " ", kMistakes[i].nouns,
+                     " of object ", size.handle, " and others show ", kMistakes[i].meaning, ratio));
+    if (size.ratio > 0) SetFigure(warning, "ratio", size.ratio);
+    SetFigure(warning, "object", size.handle);
   }
+}
+
+bool Shows(const IntakeFindings& findings, EngineMistake mistake) {
+  return findings.mistakes[static_cast<size_t>(mistake)].count > 0;
 }
 
 /// Adds the warnings about impulses and points.
 void AddContactWarnings(const IntakeFindings& findings, uint64_t accepted_count,
                         Warnings& warnings) {
-  if (const uint64_t count = findings.fast_impulse_count; count > 0) {
+  AddMistakes(findings, warnings);
+  const uint64_t fast_count = findings.fast_impulse_count;
+  if (fast_count > 0 && !Shows(findings, EngineMistake::kForces)) {
     const double largest_m_per_s = findings.largest_speed_change_m_per_s;
     v1::Warning& warning =
-        Add(warnings, "IMPULSES_TOO_FAST", count,
+        Add(warnings, "IMPULSES_TOO_FAST", fast_count,
             absl::StrFormat("%s changed the speed of an object by up to %.3g m/s; give impulses in "
                             "newton seconds, which are forces times the step, and no forces",
-                            Counted(count, "contact"), largest_m_per_s));
+                            Counted(fast_count, "contact"), largest_m_per_s));
     SetFigure(warning, "largest_speed_change_m_per_s", largest_m_per_s);
   }
-  // An engine's contact without an impulse counts as a load, and an impact with an impulse of zero
-  // counts as accepted, once or twice for one or two objects.
+  // An impact with an impulse of zero counts as accepted, once or twice for one or two objects.
   const uint64_t zeros = findings.zero_impulse_count;
-  if (zeros > 0 && findings.engine.blow_count == 0 && zeros >= findings.engine.load_count &&
-      2 * zeros >= accepted_count) {
+  const uint64_t others = findings.engine.blow_count + findings.engine.load_count;
+  const bool silent = others == 0 && 2 * zeros >= accepted_count;
+  if (silent && zeros > 0 && !Shows(findings, EngineMistake::kFirstZero)) {
     Add(warnings, "IMPULSES_ZERO", zeros,
         absl::StrCat("the impulse of ", Counted(zeros, "contact"),
                      " was zero, and no other sounded; read impulses after the engine has solved "
                      "its step, and give newton seconds"));
+  } else if (zeros >= kManyZeros && zeros >= kMostZeros * (others + accepted_count)) {
+    Add(warnings, "IMPULSES_ZERO", zeros,
+        absl::StrCat("the impulse of ", Counted(zeros, "contact"),
+                     " was zero, nearly all that were sent; leave out pairs that do not touch"));
   }
   if (const uint64_t count = findings.distant_point_count; count > 0) {
     v1::Warning& warning = Add(

@@ -38,7 +38,7 @@ class MistakesTest(PackageTest):
         self.assertIn("ContactWarning: STREAM_NOT_CLOSED: ", done.stderr)
         self.assertIn("ContactWarning: POINTS_DISTANT: ", done.stderr)
 
-    def test_partners_that_change_and_time_that_stands_still_are_told(self):
+    def test_partners_that_change_do_not_strike_and_time_that_stands_still_is_told(self):
         def told(partner, time_s):
             trace = carillon.Trace(step=1 / 240)
             bar = trace.add(self.model)
@@ -52,8 +52,7 @@ class MistakesTest(PackageTest):
         blow_count, warned = told(lambda i: 1, lambda i: i / 240)
         self.assertEqual(warned, [])
         strikes, warned = told(lambda i: i, lambda i: i / 240)
-        self.assertEqual(warned, [("PARTNERS_CHANGE", 58)])
-        self.assertGreater(strikes, 10 * blow_count)
+        self.assertEqual((strikes, warned), (blow_count, []))
         self.assertEqual(told(lambda i: 1, lambda i: 0)[1], [("TIME_STANDS", 59)])
 
     def test_mistakes_that_were_silent_are_refused(self):

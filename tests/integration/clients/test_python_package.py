@@ -264,12 +264,13 @@ class ContactsTest(PackageTest):
     def test_contacts_sound_as_the_same_in_rows(self):
         trace = carillon.Trace(1 / 240)
         bar = trace.add(self.model)
+        blow = numpy.multiply(10, IMPULSE)  # far above the weight of the bar
         for i in range(3):
             step = contact_pb2.ContactStep(time_s=i / 240)
             step.contacts.add(object=bar, partner=7, point_m=carillon.contacts.vector(numpy.float32(POINT)),
-                              impulse_newton_seconds=carillon.contacts.vector(numpy.float32(IMPULSE)))
+                              impulse_newton_seconds=carillon.contacts.vector(numpy.float32(blow)))
             trace.steps.append(step)
-        contacts = carillon.Contacts(1, [POINT], [IMPULSE], partners=[7])
+        contacts = carillon.Contacts(1, [POINT], [blow], partners=[7])
         self.assert_same(self.rendered(*((i / 240, {"contacts": contacts}) for i in range(3))),
                          self.c.render(trace, tail_s=0.3))
 

@@ -124,27 +124,96 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
   EXPECT_EQ(gatherer_.counts().load_count, 0U);
 }
 
-TEST_F(BlowGathererTest, PartnersThatChangeInEachStepAreCounted) {
-  const auto touch = [&](int i, std::initializer_list<uint32_t> partners) {
-    Step(i * kStepS, [&] {
-      for (const uint32_t partner : partners) {
-        gatherer_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
-      }
-    });
-    return gatherer_.counts().changed_partner_count;
+/// The impulse that holds an object of 1 kg up in a step.
+constexpr double kWeight = 9.81 * kStepS;
+
+/// Sends `step_count` steps, in which `touch` touches, and one more; the sum of the blows, N s.
+template <typename Touch>
+double StruckBy(int step_count, const Touch& touch) {
+  BlowGatherer gatherer(kStepS);
+  double struck = 0;
+  const auto add = [&](BlowGatherer::Events events) {
+    for (const ForceEvent& event : events) struck += Pushed{event}.Impulse().value_or(0);
   };
-  // A partner comes and goes beside one that stays.
-  int step = 0;
-  for (; step < 20; ++step) EXPECT_EQ(touch(step, {1, 100 + static_cast<uint32_t>(step)}), 0U);
-  // It counts from the tenth change on, once four fifths of the steps in contact are changes.
-  for (; step < 100; ++step) EXPECT_EQ(touch(step, {100 + static_cast<uint32_t>(step)}), 0U);
-  for (; step < 110; ++step) EXPECT_GE(touch(step, {100 + static_cast<uint32_t>(step)}), 80U);
-  EXPECT_EQ(touch(step, {7}), 90U);
-  // A flight between two partners is no change, and neither is one that stands alone.
-  Nothing(++step * kStepS);
-  EXPECT_EQ(touch(++step, {8}), 90U);
-  EXPECT_EQ(touch(++step, {9}), 90U);
-  EXPECT_EQ(touch(++step, {9}), 90U);
+  for (int step = 0; step < step_count; ++step) {
+    add(gatherer.Begin(step * kStepS));
+    touch(gatherer, step);
+    add(gatherer.End());
+  }
+  add(gatherer.Finish());
+  return struck;
+}
+
+void TouchBy(BlowGatherer& gatherer, uint32_t handle, uint32_t partner, double newton_seconds) {
+  SurfaceImpulse impulse = kTen;
+  impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
+  gatherer.Touch({.contact = {.handle = handle}, .partner = partner}, FeltBy(handle, impulse));
+}
+
+TEST(BlowGatherer, WhatRestsWhenTheSimulationBeginsDoesNotStrike) {
+  for (const int step_count : {2, 5, 50}) {
+    EXPECT_LT(StruckBy(step_count, [](auto& gatherer, int) { TouchBy(gatherer, 3, 1, kWeight); }),
+              1e-6);
+  }
+  // Ten bodies in a pile: the lowest carries ten weights, and hands on nine.
+  EXPECT_LT(StruckBy(50,
+                     [](auto& gatherer, int) {
+                       for (uint32_t body = 1; body <= 10; ++body) {
+                         TouchBy(gatherer, body, body - 1, (11 - body) * kWeight);
+                         if (body < 10) TouchBy(gatherer, body, body + 1, (body - 10.0) * kWeight);
+                       }
+                     }),
+            1e-6);
+  // A blow in the first step strikes at once.
+  BlowGatherer gatherer(kStepS);
+  gatherer.Begin(0);
+  TouchBy(gatherer, 3, 1, 1);
+  EXPECT_EQ(Pushed{gatherer.End()[0]}.Impulse(), 1);
+}
+
+TEST(BlowGatherer, AFeebleBlowOfOneStepStrikes) {
+  for (const int at : {0, 5}) {
+    EXPECT_NEAR(StruckBy(20,
+                         [at](auto& gatherer, int step) {
+                           if (step == at) TouchBy(gatherer, 3, 1, kWeight);
+                         }),
+                kWeight, 1e-6);
+  }
+}
+
+TEST(BlowGatherer, AContactThatFlickersDoesNotStrike) {
+  for (const int phase : {0, 1}) {
+    EXPECT_LT(StruckBy(100,
+                       [&](auto& gatherer, int step) {
+                         if (step % 2 == phase) TouchBy(gatherer, 3, 1, 2 * kWeight);
+                       }),
+              1e-6)
+        << phase;
+  }
+}
+
+TEST(BlowGatherer, ABodyThatChangesItsPartnerWithoutALeapOfItsLoadDoesNotStrike) {
+  for (const int steps_each : {1, 2, 24}) {
+    EXPECT_LT(StruckBy(200,
+                       [&](auto& gatherer, int step) {
+                         TouchBy(gatherer, 3, 10 + static_cast<uint32_t>(step / steps_each),
+                                 kWeight);
+                       }),
+              1e-6)
+        << steps_each;
+  }
+  // From another side, or much stronger, the next partner strikes.
+  for (const double newton_seconds : {-kWeight, 5 * kWeight}) {
+    EXPECT_GT(StruckBy(60,
+                       [&](auto& gatherer, int step) {
+                         const bool strikes = step == 30;
+                         TouchBy(gatherer, 3, strikes ? 11 : 10,
+                                 strikes ? newton_seconds : kWeight);
+                       }) *
+                  (newton_seconds > 0 ? 1 : -1),
+              0.8 * kWeight)
+        << newton_seconds;
+  }
 }
 
 TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {

@@ -60,7 +60,7 @@ TEST(ContactWarnings, EachFactHasAWarningWithItsCountAndFigures) {
   report.set_rejected_count(1);
   report.set_ahead_s(0.28);
   report.mutable_last_rejection()->set_reason("CONTACT_MALFORMED");
-  const IntakeFindings findings{.engine = {.blow_count = 1, .changed_partner_count = 11},
+  const IntakeFindings findings{.engine = {.blow_count = 1},
                                 .distant_point_count = 5,
                                 .largest_distance_m = 0.5,
                                 .regular_gap_s = 1.0 / 120,
@@ -73,7 +73,7 @@ TEST(ContactWarnings, EachFactHasAWarningWithItsCountAndFigures) {
                   Told{"TIME_REMAPPED", 2, {}}, Told{"SIMULATION_AHEAD", 0, {{"ahead_s", 0.28}}},
                   Told{"CONTACTS_DROPPED", 3, {}}, Told{"CONTACTS_REJECTED", 1, {}},
                   Told{"STEP_TOO_SHORT", 0, {{"regular_gap_s", 1.0 / 120}}},
-                  Told{"TIME_STANDS", 10, {}}, Told{"PARTNERS_CHANGE", 11, {}},
+                  Told{"TIME_STANDS", 10, {}},
                   Told{"IMPULSES_TOO_FAST", 2, {{"largest_speed_change_m_per_s", 480}}},
                   Told{"POINTS_DISTANT", 5, {{"largest_distance_m", 0.5}}}));
 }
@@ -87,12 +87,33 @@ TEST(ContactWarnings, ImpulsesOfZeroAreToldOnlyIfNoOthersSounded) {
                        counted)
                 .empty();
   };
-  EXPECT_TRUE(told(12, 0, 0));   // engine's contacts
+  EXPECT_TRUE(told(0, 0, 0));    // engine's contacts
   EXPECT_TRUE(told(0, 12, 0));   // impacts on one object
   EXPECT_TRUE(told(0, 24, 0));   // impacts on two objects
-  EXPECT_FALSE(told(13, 0, 0));  // a load sounded
+  EXPECT_FALSE(told(1, 0, 0));   // a load sounded
   EXPECT_FALSE(told(0, 25, 0));  // an impact sounded
   EXPECT_FALSE(told(12, 1, 1));  // a blow sounded
+}
+
+TEST(ContactWarnings, ContactsWithoutImpulsesAreToldBesideOthersIfTheyAreNearlyAll) {
+  const auto told = [](uint64_t zero_count, uint64_t load_count) {
+    return WarningsOf(
+        {.engine = {.blow_count = 1, .load_count = load_count}, .zero_impulse_count = zero_count});
+  };
+  EXPECT_THAT(told(60'000, 10), ElementsAre(Told{"IMPULSES_ZERO", 60'000, {}}));
+  EXPECT_THAT(told(60'000, 6000), IsEmpty());
+  EXPECT_THAT(told(999, 0), IsEmpty());
+}
+
+TEST(ContactWarnings, AMistakeOfTheEngineIsNamedWithItsSizeInPlaceOfAGuess) {
+  IntakeFindings findings{
+      .zero_impulse_count = 12, .fast_impulse_count = 2, .largest_speed_change_m_per_s = 480};
+  findings.mistakes[static_cast<size_t>(EngineMistake::kForces)] = {
+      .count = 5, .ratio = 240, .handle = 3};
+  findings.mistakes[static_cast<size_t>(EngineMistake::kFirstZero)] = {.count = 4, .handle = 2};
+  EXPECT_THAT(WarningsOf(findings),
+              ElementsAre(Told{"IMPULSES_ARE_FORCES", 5, {{"object", 3}, {"ratio", 240}}},
+                          Told{"FIRST_IMPULSES_ZERO", 4, {{"object", 2}}}));
 }
 
 TEST(ContactWarnings, ARenderingHasThoseAboutItsContacts) {
