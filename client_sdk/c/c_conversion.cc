@@ -156,6 +156,7 @@ absl::StatusOr<v1::ContactStep> ToStep(const carillon_step& step) {
   }
   v1::ContactStep made;
   made.set_time_s(step.time_s);
+  if (step.time_scale != 0) made.set_time_scale(std::max(step.time_scale, 0.0));
   for (const carillon_contact& contact : std::span(step.contacts, step.contact_count)) {
     RETURN_IF_ERROR(Set(contact, *made.add_contacts()));
   }

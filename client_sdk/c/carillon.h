@@ -128,6 +128,10 @@ typedef struct carillon_step {
   const carillon_pose* poses;
   size_t pose_count;
   const carillon_pose* listener; /**< its pose now; null: the listener stays */
+  /** Simulation time over time of the sound since the step before, 0.001 to 1000: 0.25 in slow
+   * motion, 4 in fast forward; zero: 1. Below zero the simulation pauses: the step lasts as long in
+   * the sound as a step of the simulator, and its contacts are left out. */
+  double time_scale;
 } carillon_step;
 
 /** The numbers of a stream's steps, and of its impulses by outcome. */

@@ -49,7 +49,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       balance_(settings.step_s, settings.reading.scene_frame),
       pose_times_(settings.step_s) {}
 
-absl::Status ContactIntake::BeginStep(double time_s) {
+absl::Status ContactIntake::BeginStep(double time_s, double time_scale) {
   if (!(std::abs(time_s) <= kLargestStepTimeS)) {
     return Invalid(
         "INVALID_STREAM",
@@ -63,19 +63,28 @@ absl::Status ContactIntake::BeginStep(double time_s) {
                                 ShortestDecimal(time_s), " s at step ", step_count_,
                                 "; open another stream for another run"));
   }
-  if (begins || settings_.at_once) {
-    mapper_.Begin(time_s, target_.frame());
-  } else if (!settings_.mapping) {
-    mapper_.Note(time_s, target_.frame());
+  RETURN_IF_ERROR(CheckTimeScale(time_scale, step_count_));
+  const double before_s = begins ? time_s : time_s_;
+  if (begins || settings_.at_once) mapper_.Begin(time_s, target_.frame());
+  const bool resumes = std::exchange(pauses_, time_scale == 0);
+  if (pauses_) {
+    mapper_.Pause(before_s, time_s, settings_.step_s);
+  } else {
+    mapper_.SetScale(before_s, time_scale);
   }
-  Push(gatherer_.Begin(time_s));
-  diagnostics_.BeginStep(time_s);
+  if (!begins && !settings_.at_once && !settings_.mapping && !pauses_) {
+    mapper_.Note(time_s, target_.frame(), resumes);
+  }
   time_s_ = time_s;
   ++step_count_;
+  if (pauses_) return absl::OkStatus();
+  Push(gatherer_.Begin(time_s));
+  diagnostics_.BeginStep(time_s);
   return absl::OkStatus();
 }
 
 void ContactIntake::Strike(std::span<const ObjectImpulse> impulses) {
+  if (pauses_) return;
   if (!struck_.HasRoom(impulses.size())) PushStruck();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectImpulse& impulse : impulses) {
@@ -122,6 +131,7 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
 }
 
 void ContactIntake::Hold(std::span<const ObjectForce> forces) {
+  if (pauses_) return;
   diagnostics_.NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectForce& force : forces) {
@@ -139,6 +149,7 @@ absl::Status ContactIntake::TryHold(const ObjectForce& force) {
 }
 
 void ContactIntake::Touch(std::span<const ObjectTouch> touches) {
+  if (pauses_) return;
   diagnostics_.NoteForce();
   const MutexLock lock(&scene_.mutex());
   for (const ObjectTouch& touch : touches) {
@@ -185,11 +196,10 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   for (double& component : centre) component *= object->properties.material.size;
   centre = Rotated(centre, orientation);
   for (size_t axis = 0; axis < 3; ++axis) centre[axis] += pose.position_m[axis];
-  balance_.Move(handle, centre, orientation);
+  if (!pauses_) balance_.Move(handle, centre, orientation);
   if (object->voice == nullptr) return absl::OkStatus();
   const double glide_s = pose_times_.GlideS(handle, time_s_);
-  MixerEvent move{.bank = object->bank,
-                  .action = ObjectMove{MotionTo(pose, glide_s * settings_.sample_rate_hz)}};
+  MixerEvent move{.bank = object->bank, .action = ObjectMove{MotionTo(pose, GlideFrames(glide_s))}};
   Push(move, FrameOf(time_s_ - glide_s));
   return absl::OkStatus();
 }
@@ -201,7 +211,7 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const auto* objects, scene_.MoveListener(pose));
   const double glide_s = pose_times_.GlideS(std::nullopt, time_s_);
-  const ListenerMove motion{MotionTo(pose, glide_s * settings_.sample_rate_hz)};
+  const ListenerMove motion{MotionTo(pose, GlideFrames(glide_s))};
   for (const auto& [handle, object] : *objects) {
     if (object.voice == nullptr) continue;
     MixerEvent move{.bank = object.bank, .action = motion};
@@ -211,6 +221,7 @@ absl::Status ContactIntake::TryMoveListener(const Pose& pose) {
 }
 
 void ContactIntake::EndStep() {
+  if (pauses_) return;
   PushStruck();
   Push(gatherer_.End());
   balance_.EndStep(time_s_);
@@ -299,6 +310,8 @@ void ContactIntake::Push(const ForceEvent& force) {
     blow.by = force.by;
     blow.by_sounds = force.by_sounds;
     AddBlow(force.serial, event, blow, frame);
+  } else if (auto* knot = std::get_if<ForceKnot>(&event.action)) {
+    knot->step_s /= static_cast<float>(mapping().scale);
   }
   Push(event, frame);
 }

@@ -81,9 +81,12 @@ class ContactIntake {
   /// `scene` and `target` must outlive the intake.
   ContactIntake(Scene& scene, EventTarget& target, const IntakeSettings& settings);
 
-  /// Begins the step at simulation time `time_s`. Errors: InvalidArgument (INVALID_STREAM: the time
-  /// is not finite, over 1e10 s before or after 0, or goes back).
-  absl::Status BeginStep(double time_s);
+  /// Begins the step at simulation time `time_s`. `time_scale` is simulation time over time of the
+  /// sound since the step before. At zero the simulation pauses: the sound goes on for a step, and
+  /// the contacts and forces of the step are left out. Errors: InvalidArgument (INVALID_STREAM: the
+  /// time is not finite, over 1e10 s before or after 0, or goes back; the scale is not 0.001 to
+  /// 1000).
+  absl::Status BeginStep(double time_s, double time_scale = 1);
 
   /// Each of these three functions locks the scene's mutex once for all contacts that it is given.
   /// Callers give at most kMostContactsAtOnce, so that other threads wait only briefly.
@@ -167,12 +170,16 @@ class ContactIntake {
   /// Errors: InvalidArgument (TIME_TOO_FAR_AHEAD).
   absl::Status CheckAhead(double frame) const;
   double FrameOf(double time_s) const { return mapper_.FrameOf(time_s); }
+  double GlideFrames(double glide_s) const {
+    return glide_s / mapping().scale * settings_.sample_rate_hz;
+  }
 
   Scene& scene_;
   EventTarget& target_;
   const IntakeSettings settings_;
   TimeMapper mapper_;
   double time_s_ = 0;
+  bool pauses_ = false;  // whether the step is one of a pause
   Diagnostics diagnostics_;
   StepImpulses struck_;
   BlowGatherer gatherer_;

@@ -94,14 +94,15 @@ absl::Status Environment::RemoveObject(uint32_t handle) {
   return absl::OkStatus();
 }
 
-void Environment::Step(absl::FunctionRef<void(size_t, ContactIntake&)> read,
+void Environment::Step(double time_scale, absl::FunctionRef<void(size_t, ContactIntake&)> read,
                        RenderWorkspace& workspace, size_t frame_count, std::span<float> samples) {
-  const double time_s = static_cast<double>(++step_count_) * settings_.step_s;
+  if (time_scale > 0) ++step_count_;
+  const double time_s = static_cast<double>(step_count_) * settings_.step_s;
   for (size_t microphone = 0; microphone < heard_.size(); ++microphone) {
     Heard& heard = heard_[microphone];
     ContactIntake& intake = heard.renderer->intake();
-    // Times ascend, so that no error is possible.
-    [[maybe_unused]] const absl::Status begun = intake.BeginStep(time_s);
+    // Times ascend and the scale has been checked, so that no error is possible.
+    [[maybe_unused]] const absl::Status begun = intake.BeginStep(time_s, time_scale);
     read(microphone, intake);
     Follow(settings_.microphones[microphone], heard);
     intake.EndStep();

@@ -59,9 +59,10 @@ class Environment {
   /// Removes an object, whose sound fades out. Errors: NotFound (OBJECT_NOT_FOUND).
   absl::Status RemoveObject(uint32_t handle);
 
-  /// Performs a step. `read` gives its poses and contacts to the intake of each microphone. Writes
-  /// `frame_count` frames of each channel to `samples`, one channel after the other.
-  void Step(absl::FunctionRef<void(size_t microphone, ContactIntake&)> read,
+  /// Performs a step at a scale of time (ContactIntake::BeginStep). `read` gives its poses and
+  /// contacts to the intake of each microphone. Writes `frame_count` frames of each channel to
+  /// `samples`, one channel after the other.
+  void Step(double time_scale, absl::FunctionRef<void(size_t microphone, ContactIntake&)> read,
             RenderWorkspace& workspace, size_t frame_count, std::span<float> samples);
 
   /// Returns the impacts that have been found since the last call. Their times do not include the
@@ -98,7 +99,7 @@ class Environment {
   TransferStore* const transfers_;
   std::map<uint32_t, AddedObject> objects_;
   std::vector<Heard> heard_;      // of each microphone
-  uint64_t step_count_ = 0;       // since the last reset
+  uint64_t step_count_ = 0;       // since the last reset, without pauses
   uint64_t rejected_before_ = 0;  // before the last reset
 };
 

@@ -136,7 +136,7 @@ uint64_t ForwardRenderer::settled_frame() const {
   if (intake_.step_count() == 0) return settings_.mapping.first_frame;
   // A move begins at most one step before the step of its pose. Blows, also those that span several
   // steps, lie at or after the step that makes them known.
-  const double back_s = settings_.step_s + kLongestLeadS;
+  const double back_s = settings_.step_s / intake_.mapping().scale + kLongestLeadS;
   const double frame = intake_.newest_frame() - back_s * settings_.sample_rate_hz - 1;
   return std::max(settings_.mapping.first_frame, static_cast<uint64_t>(std::max(frame, 0.0)));
 }

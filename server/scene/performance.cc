@@ -13,6 +13,11 @@
 namespace carillon {
 namespace {
 
+constexpr double kLongestStepS = 1;
+
+/// Returns the length of the sound of a step over the step.
+double SoundSteps(double time_scale) { return time_scale > 0 ? 1 / time_scale : 1; }
+
 absl::Status Invalid(absl::string_view what, double value, double least, double most) {
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
                  absl::StrCat(what, " is ", value, "; it must be ", least, " to ", most));
@@ -37,8 +42,8 @@ absl::Status Performance::Validate(const EnvironmentSettings& settings, size_t e
   if (!(settings.latency_s >= 0 && settings.latency_s <= 0.1)) {
     return Invalid("latency_s", settings.latency_s, 0, 0.1);
   }
-  if (!(settings.step_s >= 1e-6 && settings.step_s <= 1)) {
-    return Invalid("step_s", settings.step_s, 1e-6, 1);
+  if (!(settings.step_s >= 1e-6 && settings.step_s <= kLongestStepS)) {
+    return Invalid("step_s", settings.step_s, 1e-6, kLongestStepS);
   }
   return absl::OkStatus();
 }
@@ -74,16 +79,29 @@ size_t Performance::EnvironmentBytes(const EnvironmentSettings& settings) {
   return settings.microphones.size() * kRendererBytes;
 }
 
-std::span<const float> Performance::Step(Read read) {
-  const auto frames_until = [&](uint64_t step) {
-    return std::round(static_cast<double>(step) * settings_.step_s * settings_.sample_rate_hz);
+absl::Status Performance::CheckScale(double time_scale) const {
+  RETURN_IF_ERROR(CheckTimeScale(time_scale, step_count_));
+  const double sound_s = SoundSteps(time_scale) * settings_.step_s;
+  if (sound_s <= kLongestStepS) return absl::OkStatus();
+  return Refusal(
+      absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
+      absl::StrCat("the sound of step ", step_count_, " lasts ", sound_s, " s at a time_scale of ",
+                   time_scale, "; it may last 1 s: perform shorter steps"));
+}
+
+std::span<const float> Performance::Step(Read read, double time_scale) {
+  const double before = sound_steps_;
+  sound_steps_ += SoundSteps(time_scale);
+  const auto frames_until = [&](double count) {
+    return std::round(count * settings_.step_s * settings_.sample_rate_hz);
   };
-  frame_count_ = static_cast<size_t>(frames_until(step_count_ + 1) - frames_until(step_count_));
+  frame_count_ = static_cast<size_t>(frames_until(sound_steps_) - frames_until(before));
   ++step_count_;
   const size_t size = channel_count_ * frame_count_;
   samples_.resize(environments_.size() * size);
   const auto perform = [&](size_t thread, size_t index) {
     environments_[index]->Step(
+        time_scale,
         [&](size_t microphone, ContactIntake& intake) { read(index, microphone, intake); },
         workspaces_[thread], frame_count_, std::span(samples_).subspan(index * size, size));
   };

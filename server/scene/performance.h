@@ -51,11 +51,16 @@ class Performance {
   /// Returns the memory of one environment without its objects, bytes.
   static size_t EnvironmentBytes(const EnvironmentSettings& settings);
 
-  /// Performs a step. `read` gives the poses and contacts of an environment to the intake of one of
+  /// Performs a step, whose sound lasts the step over `time_scale` or, in a pause, at zero, the
+  /// step. `read` gives the poses and contacts of an environment to the intake of one of
   /// its microphones; several threads call it at once. Returns the samples, which stay valid until
   /// the next call: element [environment][channel][frame].
   using Read = absl::FunctionRef<void(size_t environment, size_t microphone, ContactIntake&)>;
-  std::span<const float> Step(Read read);
+  std::span<const float> Step(Read read, double time_scale = 1);
+
+  /// Checks the scale of the next step. Errors: InvalidArgument (INVALID_STREAM: the scale is not
+  /// 0.001 to 1000, or the sound of the step is longer than 1 s).
+  absl::Status CheckScale(double time_scale) const;
 
   /// Number of frames of the last step.
   size_t frame_count() const { return frame_count_; }
@@ -71,6 +76,7 @@ class Performance {
   std::vector<std::unique_ptr<Environment>> environments_;
   std::vector<float> samples_;
   uint64_t step_count_ = 0;
+  double sound_steps_ = 0;  // the length of the sound over the step
   size_t frame_count_ = 0;
 };
 

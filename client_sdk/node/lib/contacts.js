@@ -25,7 +25,7 @@ const OBJECT = 'an object that scene.add or trace.add returned, or its handle, a
 const PARTNER = 'a whole number from 0 to 4294967295 that names the other body, such as its place in your list of ' +
   'bodies';
 const DURATION = 'zero seconds or more, or NaN, which leaves it to the daemon';
-const STEP_KEYS = ['contacts', 'impacts', 'forces', 'poses', 'listener'];
+const STEP_KEYS = ['contacts', 'impacts', 'forces', 'poses', 'listener', 'timeScale'];
 const COLLISION = ['duration', 'timeOffset', 'striker'];
 const COLLISIONS = ['durations', 'timeOffsets', 'striker'];
 const SECOND_COLUMNS = ['secondObjects', 'secondPoints', 'secondRotations'];
@@ -219,6 +219,14 @@ function poseColumns(columns) {
   return made;
 }
 
+/** The scale of a step's time. Throws TypeError if it is not one. */
+function checkedScale(scale) {
+  if (scale !== undefined && scale !== 0 && !(scale >= 0.001 && scale <= 1000)) {
+    refuse(scale, 'timeScale', 'simulation time over time of the sound, 0.001 to 1000, or 0 in a pause');
+  }
+  return scale;
+}
+
 /**
  * Makes the message of the step at a simulation time, seconds. Contacts, impacts and forces are rows if they are an
  * array, and columns otherwise.
@@ -227,7 +235,7 @@ function makeStep(time, own) {
   const content = own ?? {};
   if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
   refuseUnknown(content, STEP_KEYS, 'step');
-  const step = present({ timeS: time });
+  const step = { ...present({ timeS: time }), ...given('timeScale', checkedScale(content.timeScale)) };
   for (const name of Object.keys(KINDS)) {
     const contacts = content[name];
     if (Array.isArray(contacts)) {
@@ -279,5 +287,5 @@ function objectsOf(content) {
   return rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
 }
 
-module.exports = { contactColumns, countRows, given, makeStep, objectsOf, poseColumns, present, refuseTime, strikeOf,
+module.exports = { checkedScale, contactColumns, countRows, given, makeStep, objectsOf, poseColumns, present, refuseTime, strikeOf,
   toHandle, toPose };

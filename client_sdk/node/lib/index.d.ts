@@ -155,6 +155,7 @@ export class Performance {
   step(content?: {
     contacts?: OfEnvironments<Contacts>; impacts?: OfEnvironments<Impacts>; forces?: OfEnvironments<ContactForces>;
     poses?: OfEnvironments<NonNullable<StepContent['poses']>>;
+    timeScale?: number;
   }): Promise<{ samples: Float32Array; frameCount: number; impacts: PerformedImpacts__Output | null }>;
   close(): void;
 }
@@ -169,6 +170,11 @@ export interface StepContent {
   forces?: ContactForce[] | ContactForces;
   poses?: { objects: ObjectLike | ArrayLike<ObjectLike>; positions: Table; orientations?: Table };
   listener?: Pose;
+  /**
+   * Simulation time over time of the sound since the step before: 0.25 in slow motion, 4 in fast forward, 0 in a pause,
+   * in which contacts are left out. The default is 1.
+   */
+  timeScale?: number;
 }
 
 export interface StreamSettings {

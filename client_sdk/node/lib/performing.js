@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { contactColumns, given, poseColumns, present, toHandle, toPose } = require('./contacts');
+const { checkedScale, contactColumns, given, poseColumns, present, toHandle, toPose } = require('./contacts');
 const { fromCall, fromInfo } = require('./errors');
 const { named, toRadiation } = require('./materials');
 const { samplesOf } = require('./sound');
@@ -113,13 +113,14 @@ class Performance {
 
   /**
    * Performs a step of all environments, with contacts, impacts, forces and poses as columns at its end; their
-   * `environments` have the index of each row, by default 0. Returns the samples of the step, a Float32Array with
+   * `environments` have the index of each row, by default 0. The sound lasts the step over `timeScale`, by default 1,
+   * and the step in a pause, at 0. Returns the samples of the step, a Float32Array with
    * element [environment][channel][frame], `frameCount`, and the impacts if the performance tells them, as the columns
    * of PerformedImpacts. Throws CarillonError if a contact is rejected; the step was performed without it.
    */
   async step(content = {}) {
-    refuseUnknown(content, ['contacts', 'impacts', 'forces', 'poses'], 'step');
-    const step = this.next;
+    refuseUnknown(content, ['contacts', 'impacts', 'forces', 'poses', 'timeScale'], 'step');
+    const step = { ...this.next, ...given('timeScale', checkedScale(content.timeScale)) };
     this.next = {};
     for (const name of ['contacts', 'impacts', 'forces']) {
       if (!content[name]) continue;

@@ -201,7 +201,7 @@ void ReadRows(const v1::ContactColumns& columns, std::span<const int> rows,
 }
 
 absl::Status ReadStep(const v1::ContactStep& step, ContactIntake& intake) {
-  RETURN_IF_ERROR(intake.BeginStep(step.time_s()));
+  RETURN_IF_ERROR(intake.BeginStep(step.time_s(), step.has_time_scale() ? step.time_scale() : 1));
   ReadColumns(step.poses(), intake);
   if (step.has_listener()) intake.MoveListener(FromProto(step.listener()));
   ReadRows(step, intake);

@@ -169,8 +169,8 @@ void AddTimeWarnings(const v1::StreamContactsResponse& report, Warnings& warning
     Add(warnings, "TIME_REMAPPED", report.remap_count(),
         absl::StrCat("simulation time was mapped anew ", Counted(report.remap_count(), "time"),
                      ", because every step of a quarter of a second was late; the simulator "
-                     "paused, gives steps no time, or is slower than real time, for which "
-                     "rendering a trace suits"));
+                     "gives steps no time, or is slower than real time: say so by time_scale, or "
+                     "render a trace"));
   }
   if (report.ahead_s() > report.scheduling_delay_s() + kUsualLeadS) {
     v1::Warning& warning =

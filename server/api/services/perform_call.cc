@@ -117,6 +117,8 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   absl::Status Step(const v1::PerformStep& step) {
+    const double time_scale = step.has_time_scale() ? step.time_scale() : 1;
+    RETURN_IF_ERROR(performance_->CheckScale(time_scale));
     for (const v1::RemovedObject& removed : step.removed_objects()) {
       RETURN_IF_ERROR(ForEach(removed.environments(), [&](Environment& environment) {
         return environment.RemoveObject(removed.object());
@@ -125,10 +127,11 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
     for (const v1::PerformedObject& object : step.added_objects()) RETURN_IF_ERROR(Add(object));
     ASSIGN_OR_RETURN(const PerformRows rows,
                      PerformRows::Make(step, performance_->environment_count(), microphone_count_));
-    samples_ =
-        performance_->Step([&rows](size_t environment, size_t microphone, ContactIntake& intake) {
+    samples_ = performance_->Step(
+        [&rows](size_t environment, size_t microphone, ContactIntake& intake) {
           rows.Read(environment, microphone, intake);
-        });
+        },
+        time_scale);
     sent_count_ = 0;
     answers_ = true;
     return absl::OkStatus();

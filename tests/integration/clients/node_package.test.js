@@ -312,6 +312,12 @@ test('a performance gives the samples of each step, the same again after a reset
   await assert.rejects(sound.step({ impacts: { ...blow, objects: 9 } }), { reason: 'OBJECT_NOT_FOUND' });
   await assert.rejects(sound.step({ impacts: { ...blow, environments: [2] } }), { reason: 'PERFORMANCE_MALFORMED' });
   await assert.rejects(c.perform({ step: 0.02, latency: 1 }), { reason: 'INVALID_SETTINGS' });
+  const slow = await c.perform({ step: 0.02 });
+  const counts = [];
+  for (const timeScale of [1, 0.25, 0, 4]) counts.push((await slow.step({ timeScale })).frameCount);
+  assert.deepEqual(counts, [960, 3840, 960, 240]);
+  await assert.rejects(slow.step({ timeScale: -1 }), TypeError);
+  slow.close();
   sound.close();
 });
 

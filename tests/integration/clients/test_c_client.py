@@ -58,7 +58,8 @@ class Pose(ctypes.Structure):
 
 class Step(ctypes.Structure):
     _fields_ = [("time_s", ctypes.c_double), ("contacts", ctypes.POINTER(Contact)), ("contact_count", ctypes.c_size_t),
-                ("poses", ctypes.POINTER(Pose)), ("pose_count", ctypes.c_size_t), ("listener", ctypes.POINTER(Pose))]
+                ("poses", ctypes.POINTER(Pose)), ("pose_count", ctypes.c_size_t), ("listener", ctypes.POINTER(Pose)),
+                ("time_scale", ctypes.c_double)]
 
 
 class Hearing(ctypes.Structure):
@@ -246,6 +247,27 @@ class CClientTest(DaemonTest):
             self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
         self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(samples, same.samples)
+
+    def test_a_trace_in_slow_motion_and_with_a_pause_renders_to_the_samples_that_python_gets(self):
+        scales = (0, 0.25, -1, 4)
+
+        def steps(handle):
+            blow = impact(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+            return [Step(0.125 * i, ctypes.pointer(blow), 1, time_scale=scale) for i, scale in enumerate(scales)]
+
+        file = str(self.folder / "slow.contacts")
+        model = self.write_trace(file, steps)
+        trace = carillon.Trace(1 / 60)
+        handle = trace.add(model, meshes.MATERIAL)
+        for i, scale in enumerate((None, 0.25, 0, 4)):
+            trace.step(0.125 * i, impacts=carillon.Impacts(handle, (0.2, 0.015, 0.01), (0, 0, -0.01), durations=1e-4),
+                       time_scale=scale)
+        samples = self.render(file)
+        with carillon.connect(self.daemon.server) as c:
+            same = c.render(trace, sample_rate_hz=44100, tail_s=0.5)
+        # Columns have floats, and rows doubles.
+        numpy.testing.assert_allclose(samples, same.samples, atol=1e-4 * same.peak)
+        self.assertAlmostEqual(len(samples) / 44100, 0.5 + 1 / 60 + 0.125 / 4 + 0.5, delta=0.005)
 
     def test_a_step_whose_time_is_too_large_or_goes_back_is_not_written(self):
         file, trace = str(self.folder / "back.contacts"), ctypes.c_void_p()

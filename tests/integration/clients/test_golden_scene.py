@@ -31,7 +31,8 @@ class GoldenSceneTest(DaemonTest):
             made[name] = [file.read_bytes() for file in files]
         samples = numpy.frombuffer(made["C++"][1], "<f4")
         self.assertGreater(numpy.abs(samples).max(), 1e-4)
-        self.assertGreater(len(samples), 2 * 48000)
+        # The steps to 0.25 s, a pause of a step, the rest in slow motion, and the tail.
+        self.assertAlmostEqual(len(samples) / 2 / 48000, 0.25 + 1 / 64 + (0.25 + 1 / 128) / 0.5 + 0.5, delta=0.005)
         for name, (trace, sound) in made.items():
             self.assertEqual(trace, made["C++"][0], f"the trace of {name} differs from that of C++")
             self.assertEqual(sound, made["C++"][1], f"the sound of {name} differs from that of C++")

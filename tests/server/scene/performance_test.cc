@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -128,6 +129,79 @@ TEST_F(PerformanceTest, IsBitForBitAnOfflineRenderingOfItsTrace) {
   rendered.resize(performed.size());
   EXPECT_EQ(offline->summary().limited_frame_count, 0U);
   EXPECT_EQ(performed, rendered);
+}
+
+/// The scale of time of step k: slow motion, a pause and fast forward.
+double ScaleOf(int step) {
+  constexpr std::array<double, 6> kScales{1, 0.25, 0.3, 0, 4, 1};
+  return kScales[static_cast<size_t>(step / 5)];
+}
+
+TEST_F(PerformanceTest, IsBitForBitAnOfflineRenderingThoughTheScaleOfTimeChanges) {
+  constexpr int kSteps = 29;
+  auto settings = SettingsWith(0.05, {.pose = {.position_m = {0, 1, 0}}});
+  settings.full_scale_pa = 200;
+  const auto performance = Make(settings, 1);
+  const auto offline = *OfflineRenderer::Make(
+      {.tail_s = 1,
+       .gain = 10,
+       .step_s = kStepS,
+       .space = {.hearing = settings.hearing, .listener = settings.microphones[0].pose},
+       .mapping = {.delay_s = 0.05}},
+      bodies_);
+  ObjectProperties larger = SmallProperties();
+  larger.material.size = 1.7;
+  larger.pose = Pose{.position_m = {0.5, 0, 0}};
+  ASSERT_TRUE(offline->forward().AddObject(1, model_, SmallProperties()).ok());
+  ASSERT_TRUE(offline->forward().AddObject(2, model_, larger).ok());
+  std::vector<float> performed;
+  double time_s = 0, frames = 0;
+  for (int step = 1; step <= kSteps; ++step) {
+    const double scale = ScaleOf(step);
+    ASSERT_TRUE(performance->CheckScale(scale).ok());
+    const auto samples = performance->Step(
+        [&](size_t, size_t, ContactIntake& intake) { intake.Strike(ImpulsesOf(0, step)); }, scale);
+    performed.insert(performed.end(), samples.begin(), samples.end());
+    frames += 960 / (scale > 0 ? scale : 1);
+    EXPECT_NEAR(static_cast<double>(performed.size()), frames, 0.51) << step;
+    if (scale > 0) time_s = (step - (step < 20 ? 0 : 5)) * kStepS;
+    ASSERT_TRUE(offline->intake().BeginStep(time_s, scale).ok());
+    offline->intake().Strike(ImpulsesOf(0, step));
+    offline->intake().EndStep();
+  }
+  offline->forward().Finish();
+  std::vector<float> rendered((performed.size() + 127) / 128 * 128);
+  ASSERT_EQ(offline->Render(rendered), rendered.size());
+  rendered.resize(performed.size());
+  EXPECT_GT(LargestOf(performed), 1e-4);
+  EXPECT_EQ(performed, rendered);
+  EXPECT_THAT(performance->CheckScale(0.01).ToString(), HasSubstr("INVALID_STREAM"));
+  EXPECT_THAT(performance->CheckScale(-1).ToString(), HasSubstr("INVALID_STREAM"));
+}
+
+TEST_F(PerformanceTest, SlowMotionSpreadsImpactsWhichSoundAsEver) {
+  const auto hear = [&](double scale) {
+    const auto performance = Make(SettingsWith(0), 1);
+    std::vector<float> sound;
+    for (int step = 1; step <= 12; ++step) {
+      const auto samples = performance->Step(
+          [&](size_t, size_t, ContactIntake& intake) {
+            if (step == 1 || step == 10) intake.Strike(SmallImpulse(1));
+          },
+          scale);
+      sound.insert(sound.end(), samples.begin(), samples.end());
+    }
+    return sound;
+  };
+  const std::vector<float> usual = hear(1), slow = hear(0.25);
+  ASSERT_EQ(slow.size(), 4 * usual.size());
+  const auto largest = [](const std::vector<float>& sound, size_t frame) {
+    return LargestOf(std::span(sound).subspan(frame, 960));
+  };
+  // Each impact is as loud as ever, and comes four times as late.
+  EXPECT_EQ(LargestOf(std::span(slow).first(4 * 960)), 0);
+  EXPECT_NEAR(largest(slow, 4 * 960) / largest(usual, 960), 1, 0.01);
+  EXPECT_GT(largest(slow, 4 * 9600), 10 * largest(slow, 4 * 9600 - 960));
 }
 
 /// Step k is heard from its end on.

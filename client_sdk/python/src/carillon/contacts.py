@@ -45,6 +45,7 @@ OBJECT = ("an object that Scene.add or Trace.add returned, or its handle, a whol
           f"{checks.MOST_OF_32_BITS}")
 PARTNER = (f"a whole number from 0 to {checks.MOST_OF_32_BITS} that names the other body, such as its place in your "
            "list of bodies")
+TIME_SCALE = "simulation time over time of the sound, 0.001 to 1000, or 0 in a pause"
 DURATION = "zero seconds or more, or NaN, which leaves it to the daemon"
 STRIKER_FIGURES = ("mass_kg", "radius_m", "young_pa", "poisson_ratio")
 
@@ -347,11 +348,19 @@ def refuse_time(time: float, number: int, before: float, repair: str) -> None:
                                    f"{number}; {repair}")
 
 
+def checked_scale(scale: Optional[float]) -> Optional[float]:
+    """The scale of a step's time. Raises ValueError if it is not one."""
+    if scale is not None and checks.number(scale, "time_scale", TIME_SCALE) and not 0.001 <= scale <= 1000:
+        checks.refuse(scale, "time_scale", TIME_SCALE)
+    return scale
+
+
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
               forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
-              listener: Optional[PoseLike] = None) -> contact_pb2.ContactStep:
+              listener: Optional[PoseLike] = None, time_scale: Optional[float] = None) -> contact_pb2.ContactStep:
     """Makes the message of the step at a simulation time, seconds."""
-    step = contact_pb2.ContactStep(time_s=checks.number(time, "time", "the simulation time in seconds"))
+    step = contact_pb2.ContactStep(time_s=checks.number(time, "time", "the simulation time in seconds"),
+                                   time_scale=checked_scale(time_scale))
     for name, given, kind in (("contacts", contacts, Contacts), ("impacts", impacts, Impacts),
                               ("forces", forces, ContactForces)):
         if given is not None:

@@ -16,7 +16,7 @@ import numpy
 from carillon import checks, contacts, errors, materials
 from carillon.columns import append
 from carillon.connection import Connection
-from carillon.contacts import Array, ContactForces, Contacts, Impacts, PoseLike, Poses
+from carillon.contacts import Array, ContactForces, Contacts, Impacts, PoseLike, Poses, checked_scale
 from carillon.faces import AwaitedBlock, Block, BlockingBlock, call
 from carillon.v1 import contact_trace_pb2, performance_pb2
 
@@ -182,12 +182,17 @@ class PerformanceCalls(Block):
     @call
     async def step(self, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
                    forces: Optional[ContactForces] = None,
-                   poses: Optional[Poses] = None) -> tuple[numpy.ndarray, HeardImpacts]:
+                   poses: Optional[Poses] = None,
+                   time_scale: Optional[float] = None) -> tuple[numpy.ndarray, HeardImpacts]:
         """Performs a step of all environments. Contacts and poses are those at its end, as in ContactStream.step; their
-        `environments` have the index of each row, by default 0. Returns the samples of the step, a float32 array
+        `environments` have the index of each row, by default 0. The sound lasts the step over `time_scale`, by default
+        1, and the step in a pause, at 0. Returns the samples of the step, a float32 array
         [environment, channel, frame] that must not be written to, and the impacts if the performance tells them. Raises
         CarillonError if a contact is rejected; the step was performed without it."""
+        scale = checked_scale(time_scale)
         step, self._next = self._next, performance_pb2.PerformStep()
+        if scale is not None:
+            step.time_scale = scale
         _fill(step, contacts, impacts, forces, poses)
         message = (await self._ask(performance_pb2.PerformRequest(step=step))).samples
         pieces = [message]

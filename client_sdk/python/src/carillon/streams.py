@@ -105,10 +105,11 @@ class StreamCalls(Block):
 
     def _put_step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
                   forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
-                  listener: Optional[PoseLike] = None) -> None:
+                  listener: Optional[PoseLike] = None, time_scale: Optional[float] = None) -> None:
         for columns in (contacts, impacts, forces, poses):
             _refuse_other_scenes(columns, self._start.scene)
-        self._put(make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener))
+        self._put(make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener,
+                            time_scale=time_scale))
 
     def _put(self, step: contact_pb2.ContactStep) -> None:
         if self._is_closed:
@@ -211,10 +212,13 @@ class ContactStream(BlockingBlock, StreamCalls):
 
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
              forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
-             listener: Optional[PoseLike] = None) -> None:
+             listener: Optional[PoseLike] = None, time_scale: Optional[float] = None) -> None:
         """Sends a step at a simulation time, seconds: the contacts that an engine reports, in every step; strikes;
-        loads of a simulator that knows them; poses of objects, and of the listener. Errors as those of `send`."""
-        self._put_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener)
+        loads of a simulator that knows them; poses of objects, and of the listener. `time_scale` is simulation time
+        over time of the sound since the step before: 0.25 in slow motion, 4 in fast forward, 0 in a pause, in which
+        contacts are left out. Errors as those of `send`."""
+        self._put_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener,
+                       time_scale=time_scale)
 
     def send(self, step: contact_pb2.ContactStep) -> None:
         """Sends a message of contact.proto. Raises CarillonError if the stream has failed or has been closed

@@ -49,7 +49,7 @@ class Trace:
 
     def step(self, time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
              forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
-             listener: Optional[PoseLike] = None) -> None:
+             listener: Optional[PoseLike] = None, time_scale: Optional[float] = None) -> None:
         """Adds a step, as ContactStream.step sends one. Raises CarillonError (INVALID_STREAM) and adds nothing if the
         time goes back, or is over 1e10 s before or after 0. A trace without a clock can be rendered if its times are 0
         to 86400 s."""
@@ -58,7 +58,8 @@ class Trace:
                              "stream: Trace(step=1/240)")
         for columns in (contacts, impacts, forces, poses):
             _refuse_objects_of_scenes(columns)
-        made = make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener)
+        made = make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener,
+                         time_scale=time_scale)
         refuse_time(made.time_s, len(self.steps), self.steps[-1].time_s if self.steps else 0,
                     "make another trace for another run")
         self.steps.append(made)

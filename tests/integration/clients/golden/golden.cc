@@ -87,9 +87,17 @@ carillon::v1::ContactStep Slide(int number) {
   return step;
 }
 
+carillon::v1::ContactStep Pause() {
+  carillon::v1::ContactStep step;
+  step.set_time_s(0.25);
+  step.set_time_scale(0);
+  return step;
+}
+
 carillon::v1::ContactStep Collision() {
   carillon::v1::ContactStep step;
   step.set_time_s(0.5);
+  step.set_time_scale(0.5);
   carillon::v1::ContactColumns& columns = *step.add_contact_columns();
   columns.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
   Add({1, {0.25F, 0, 0.01F}, {0, 0.5F, 0}}, columns);
@@ -106,6 +114,7 @@ absl::Status WriteTrace(const std::string& model, const std::string& file) {
   WriteBars(model, *trace);
   absl::Status written = trace->Write(Knock());
   for (int number = 1; number <= 16; ++number) written.Update(trace->Write(Slide(number)));
+  written.Update(trace->Write(Pause()));
   written.Update(trace->Write(Collision()));
   written.Update(trace->Close());
   return written;

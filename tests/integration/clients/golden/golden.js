@@ -8,7 +8,8 @@ const carillon = require('carillon');
 
 const STEP_S = 1 / 64;
 
-/** Two bars, one twice as large, the other turned over: struck by wood, resting, sliding and colliding. */
+/** Two bars, one twice as large, the other turned over: struck by wood, resting, sliding, pausing and colliding in slow
+ * motion. */
 function makeTrace(model) {
   const trace = new carillon.Trace({ step: STEP_S, simulator: 'golden', frame: 'object' });
   trace.add(model, { material: 'chime_aluminum', radiation: 'paper_coupling', label: 'low', size: 2 });
@@ -20,8 +21,9 @@ function makeTrace(model) {
       impulses: Float32Array.of(0, 0, 0.0625, 0, i / 256, -0.03125), partners: [0, 9], travelSpeeds: [0, 0.5],
       roughnessDepth: 0.25, irregularityLength: 0.001 } });
   }
-  trace.step(0.5, { impacts: { objects: 1, points: [0.25, 0, 0.01], impulses: [0, 0.5, 0], durations: 0.0009765625,
-    timeOffsets: 0.0078125, secondObjects: 2, secondPoints: [0, 0, 0] } });
+  trace.step(0.25, { timeScale: 0 });
+  trace.step(0.5, { timeScale: 0.5, impacts: { objects: 1, points: [0.25, 0, 0.01], impulses: [0, 0.5, 0],
+    durations: 0.0009765625, timeOffsets: 0.0078125, secondObjects: 2, secondPoints: [0, 0, 0] } });
   return trace;
 }
 
