@@ -37,8 +37,10 @@ struct MeshNames {
   /// numbers.
   absl::flat_hash_map<int64_t, Point> vertices = {};
   std::vector<MeshGroup> groups = {};
-  /// The regions of tetrahedra, in the order of TetMesh::regions; empty if the file names none.
+  /// The regions of tetrahedra, in the order of TetMesh::regions, or of a surface; empty if the
+  /// file names none.
   std::vector<MeshRegion> regions = {};
+  std::vector<int32_t> triangle_regions = {};  ///< the region of each triangle of a surface
   /// The place in the file, metres, from which all positions of the mesh are counted. It is zero
   /// unless the body lies so far away that single precision would not resolve it.
   Point origin_m = {0, 0, 0};

@@ -16,6 +16,7 @@
 #include "precompute/pipeline/model_checks.h"
 #include "precompute/pipeline/worker_request.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::precompute {
@@ -38,7 +39,9 @@ void WarnOfMoreNodes(int asked, const TetMesh& mesh, std::vector<std::string>& w
 
 absl::StatusOr<Body> FillSurface(const Fillable& surface, const MeshingSettings& meshing,
                                  const worker::v1::WorkerRequest& request) {
-  ASSIGN_OR_RETURN(TetMesh mesh, Tetrahedralize(surface.prepared.surface, meshing));
+  ASSIGN_OR_RETURN(TetMesh mesh,
+                   Tetrahedralize(surface.prepared.surface, meshing, surface.prepared.walls));
+  if (!surface.prepared.parts.empty()) NameRegions(surface.prepared.parts, mesh);
   for (BoundaryFace& face : mesh.boundary) {
     face.given_triangle = surface.prepared.given_triangle[static_cast<size_t>(face.given_triangle)];
   }
@@ -60,8 +63,6 @@ absl::StatusOr<Body> TakeTetrahedra(TetMesh mesh, const MeshNames& names, BodyMa
         "for quadratic elements, or give a mesh of four-node tetrahedra");
   }
   RETURN_IF_ERROR(CheckCurvedElements(mesh));
-  // A body of one material does not need the regions.
-  if (request.settings().regions().empty()) mesh.regions.clear();
   SurfaceMesh given = BoundarySurface(mesh);
   if (mesh.nodes_per_element < nodes_per_element) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(FixNodes(FixturesOf(request), given, names, mesh));
@@ -92,6 +93,31 @@ double ExtentOf(const Mesh& mesh) {
   return Diagonal(std::get<SurfaceMesh>(mesh).vertices);
 }
 
+absl::StatusOr<PreparedSurface> Prepare(const SurfaceMesh& given,
+                                        const std::vector<int32_t>& region_of_triangle,
+                                        const BodyMaterials& materials,
+                                        const worker::v1::WorkerRequest& request) {
+  const v1::DecompositionSettings& settings = request.settings();
+  const v1::MeshSettings& mesh = settings.mesh();
+  if (settings.regions().empty()) {
+    return PrepareSurface(given, {.repair = mesh.repair(),
+                                  .wall_m = mesh.wall_m(),
+                                  .coarsen = MayCoarsen(request),
+                                  .most_triangles = 2 * mesh.target_node_count()});
+  }
+  if (mesh.repair() || mesh.wall_m() > 0) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                   "repair and wall are for a body of one material: leave them out, or repair the "
+                   "parts of the body before they are put together");
+  }
+  std::vector<std::string> names;
+  names.reserve(materials.regions().size());
+  for (const RegionMaterial& region : materials.regions()) {
+    names.push_back(QuotedText(region.region));
+  }
+  return PrepareParts(given, region_of_triangle, names);
+}
+
 }  // namespace
 
 absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::WorkerRequest& request,
@@ -105,23 +131,27 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
   const absl::Status unit = CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request));
   if (request.max_frequency_hz() > 0) RETURN_IF_ERROR(unit);
   if (!unit.ok()) read.warnings.push_back(ToErrorInfo(unit).message());
-  ASSIGN_OR_RETURN(BodyMaterials materials, MaterialsOf(request, read.names.regions));
+  ASSIGN_OR_RETURN(RegionMaterials regions, MaterialsOf(request, read.names));
+  const auto number = [&](std::vector<int32_t>& numbers) {
+    if (settings.regions().empty()) return numbers.clear();
+    for (int32_t& region : numbers)
+      region = regions.material_of_region[static_cast<size_t>(region)];
+  };
   observer.OnProgress(v1::PHASE_MESH, 0);
   if (auto* tetrahedra = std::get_if<TetMesh>(&read.mesh)) {
+    number(tetrahedra->regions);
     ASSIGN_OR_RETURN(Body body, TakeTetrahedra(std::move(*tetrahedra), read.names,
-                                               std::move(materials), request));
+                                               std::move(regions.materials), request));
     body.warnings = std::move(read.warnings);
     return body;
   }
   auto& given = std::get<SurfaceMesh>(read.mesh);
+  number(read.names.triangle_regions);
   absl::StatusOr<PreparedSurface> prepared =
-      PrepareSurface(given, {.repair = settings.mesh().repair(),
-                             .wall_m = settings.mesh().wall_m(),
-                             .coarsen = MayCoarsen(request),
-                             .most_triangles = 2 * settings.mesh().target_node_count()});
+      Prepare(given, read.names.triangle_regions, regions.materials, request);
   if (!prepared.ok()) return WithExtent(prepared.status(), given);
   std::ranges::move(read.warnings, std::back_inserter(prepared->warnings));
-  return Fillable{std::move(given), *std::move(prepared), std::move(materials),
+  return Fillable{std::move(given), *std::move(prepared), std::move(regions.materials),
                   std::move(read.names)};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/pipeline/body_regions.h"
 
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -62,24 +63,32 @@ absl::Status CheckOneMaterial(const std::vector<MeshRegion>& regions) {
 
 }  // namespace
 
-absl::StatusOr<BodyMaterials> MaterialsOf(const worker::v1::WorkerRequest& request,
-                                          const std::vector<MeshRegion>& regions) {
+absl::StatusOr<RegionMaterials> MaterialsOf(const worker::v1::WorkerRequest& request,
+                                            const MeshNames& names) {
+  const std::vector<MeshRegion>& regions = names.regions;
   const v1::DecompositionSettings& settings = request.settings();
   if (settings.regions().empty()) {
-    RETURN_IF_ERROR(CheckOneMaterial(regions));
-    return BodyMaterials({.young_pa = 1, .poisson_ratio = settings.poisson_ratio()});
+    // The materials of a surface may be no more than its colours.
+    if (names.triangle_regions.empty()) RETURN_IF_ERROR(CheckOneMaterial(regions));
+    return RegionMaterials{
+        BodyMaterials({.young_pa = 1, .poisson_ratio = settings.poisson_ratio()})};
   }
   if (regions.empty()) return RegionUnknown("materials are given by region", regions);
   std::vector<RegionMaterial> materials;
-  materials.reserve(regions.size());
-  std::set<const v1::RegionProperties*> used;
+  std::vector<int32_t> material_of_region;
+  std::map<const v1::RegionProperties*, int32_t> used;
   for (const MeshRegion& region : regions) {
     const v1::RegionProperties* const found = Find(settings.regions(), region);
     if (found == nullptr) {
       return RegionUnknown(absl::StrCat("the region ", RegionText(region), " has no material"),
                            regions);
     }
-    used.insert(found);
+    const auto [number, is_new] = used.emplace(found, static_cast<int32_t>(materials.size()));
+    material_of_region.push_back(number->second);
+    if (!is_new) {
+      if (found->region().empty()) materials[static_cast<size_t>(number->second)].region.clear();
+      continue;
+    }
     materials.push_back(
         {.region = found->region().empty() ? region.name : found->region(),
          .elastic = {.young_pa = found->relative_young(), .poisson_ratio = found->poisson_ratio()},
@@ -91,7 +100,7 @@ absl::StatusOr<BodyMaterials> MaterialsOf(const worker::v1::WorkerRequest& reque
                                       QuotedText(entry.region()), ", which is none of the file's"),
                          regions);
   }
-  return BodyMaterials(std::move(materials));
+  return RegionMaterials{BodyMaterials(std::move(materials)), std::move(material_of_region)};
 }
 
 absl::Status TakeReference(const ModalModel& model, v1::Material& material) {

@@ -100,6 +100,32 @@ class RegionsTest(DaemonTest):
             numpy.testing.assert_allclose(numpy.sqrt((2 * numpy.pi * shown)**2 + decays**2) / (2 * numpy.pi), before,
                                           rtol=1e-9)
 
+    def test_boxes_that_touch_are_the_same_body(self):
+        """The grip is thinner than the head, so that its end lies on a part of the head's face."""
+        _, width, height = meshes.BAR_SIZE
+        head = meshes.box((JOINT, width, height))
+        grip = meshes.box((LENGTH - JOINT, width / 2, height / 2), (JOINT, width / 4, height / 4))
+        surface = self.folder / "parts.obj"
+        lines, count = [], 0
+        for name, (vertices, faces) in (("head", head), ("grip", grip)):
+            lines += [f"o {name}", *(f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices)]
+            lines += ["f " + " ".join(str(count + v + 1) for v in face) for face in faces]
+            count += len(vertices)
+        surface.write_text("\n".join(lines) + "\n")
+        create = ("model", "create", surface, "--nodes", 600, "--band", "20:8000", "--wait", "--material")
+        model = self.daemon.command(*create, "head=brass", "--material", "grip=oak").stdout.strip()
+        frequencies_hz, _, header = self.modes(model)
+        mass_kg = header["mass_moments"][0] * 750  # the grip, of oak, is the reference
+        self.assertAlmostEqual(mass_kg / (JOINT * width * height * 8500
+                                          + (LENGTH - JOINT) * width * height / 4 * 750), 1, delta=1e-6)
+        self.assertGreater(len(frequencies_hz), 5)
+        out = self.folder / "parts.wav"
+        self.daemon.command("strike", model, "--out", out, "--point", f"0,0.003,{height}", "--impulse",
+                            "0.002,-0.003,-0.005", "--duration", 0, "--seconds", 1)
+        partial = sound.measure(sound.read_wave(out)[:, 0], frequencies_hz[0], 0.06, 0.2, 0.01)
+        self.assertAlmostEqual(partial.frequency_hz / frequencies_hz[0], 1, delta=1e-4)
+        self.assertIn("MESH_REGION_UNKNOWN", self.refusal(*create, "head=brass"))
+
     def test_materials_and_regions_must_match(self):
         create = ("model", "create", self.mallet, "--band", "20:8000", "--wait", "--material")
         self.assertRegex(self.refusal(*create, "brass=brass"), r"MESH_REGION_UNKNOWN.*\"grip\"|\"GRIP\"")

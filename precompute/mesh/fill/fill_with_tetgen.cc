@@ -40,6 +40,7 @@ struct Filling {
   std::vector<int32_t> corners;          // four a tetrahedron
   std::vector<int32_t> face_corners;     // three a face
   std::vector<int32_t> given_triangles;  // one a face
+  std::vector<int32_t> spaces;           // one a tetrahedron, or none
 };
 
 /// The surface without the vertices that no triangle has. TetGen would make nodes of them, and flat
@@ -113,6 +114,7 @@ std::string RunTetgen(const FillRequest& request) {
   std::string switches = request.keep_surface ? "pqazT1e-6QY" : "pqazT1e-6Q";
   // Radius to edge up to 3 instead of 2.
   if (request.cautious) switches = request.keep_surface ? "pq3azT1e-6QY" : "pq3azT1e-6Q";
+  if (request.has_walls) switches += "A";
   tetgenbehavior behavior;
   behavior.parse_commandline(switches.data());
   if (request.relative_size.is_uniform()) {
@@ -136,6 +138,12 @@ std::string RunTetgen(const FillRequest& request) {
                         {out.tetrahedronlist, static_cast<size_t>(out.numberoftetrahedra) * 4});
   AppendValues<int32_t>(bytes, {out.trifacelist, static_cast<size_t>(out.numberoftrifaces) * 3});
   AppendValues<int32_t>(bytes, {out.trifacemarkerlist, static_cast<size_t>(out.numberoftrifaces)});
+  std::vector<int32_t> spaces;
+  if (request.has_walls && out.numberoftetrahedronattributes == 1) {
+    spaces.assign(out.tetrahedronattributelist,
+                  out.tetrahedronattributelist + out.numberoftetrahedra);
+  }
+  AppendValues<int32_t>(bytes, spaces);
   return bytes;
 }
 
@@ -147,6 +155,7 @@ Filling Parse(const std::string& bytes) {
   filling.corners = TakeValues<int32_t>(next);
   filling.face_corners = TakeValues<int32_t>(next);
   filling.given_triangles = TakeValues<int32_t>(next);
+  filling.spaces = TakeValues<int32_t>(next);
   return filling;
 }
 
@@ -214,13 +223,14 @@ void PeelFlatTetrahedra(TetMesh& mesh, GivenTriangles& given) {
       gone[e] = again = true;
     }
   }
-  std::vector<int32_t> kept;
+  std::vector<int32_t> kept, regions;
   for (size_t e = 0; e < count; ++e) {
-    if (!gone[e]) {
-      kept.insert(kept.end(), &mesh.elements[4 * e], &mesh.elements[4 * e] + 4);
-    }
+    if (gone[e]) continue;
+    kept.insert(kept.end(), &mesh.elements[4 * e], &mesh.elements[4 * e] + 4);
+    if (!mesh.regions.empty()) regions.push_back(mesh.regions[e]);
   }
   mesh.elements = std::move(kept);
+  mesh.regions = std::move(regions);
 }
 
 absl::Status NameGivenTriangles(const GivenTriangles& given, TetMesh& mesh) {
@@ -246,6 +256,7 @@ absl::StatusOr<TetMesh> MakeMesh(const Filling& filling) {
   std::memcpy(mesh.nodes.data(), filling.coordinates.data(),
               filling.coordinates.size() * sizeof(double));
   mesh.elements = filling.corners;
+  mesh.regions = filling.spaces;
   GivenTriangles given = GivenTrianglesOfFaces(filling);
   PeelFlatTetrahedra(mesh, given);
   RETURN_IF_ERROR(FindBoundary(mesh));

@@ -16,6 +16,8 @@ struct FillRequest {
   const RefinedSurface& surface;
   /// A point in each cavity.
   std::vector<Point> cavities;
+  /// Whether the surface has walls inside the body, which divide it into spaces.
+  bool has_walls = false;
   /// Largest volume of a tetrahedron, in the surface's unit of length cubed, where the relative
   /// size is 1. The bound is proportional to the cube of the relative size.
   double max_volume;
@@ -32,7 +34,8 @@ struct FillRequest {
 };
 
 /// Fills the surface with 4-node tetrahedra, in a child process because TetGen crashes on some
-/// inputs. Each boundary face stores its given triangle. Errors: MESH_TETRAHEDRALIZATION_FAILED,
+/// inputs. Each boundary face stores its given triangle, and each element the number of its
+/// space if there are walls. Errors: MESH_TETRAHEDRALIZATION_FAILED,
 /// OUT_OF_MEMORY.
 absl::StatusOr<TetMesh> FillWithTetgen(const FillRequest& request);
 

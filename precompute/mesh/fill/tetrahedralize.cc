@@ -186,15 +186,21 @@ std::vector<Point> PointsInCavities(const SurfaceMesh& surface, const std::vecto
 /// A surface at unit size, filled as finely as asked.
 class Filler {
  public:
-  Filler(const SurfaceMesh& unit_surface, const UnitBox& box, const MeshingSettings& settings)
+  /// The last `wall_count` triangles of the surface are walls inside the body.
+  Filler(const SurfaceMesh& unit_surface, size_t wall_count, const UnitBox& box,
+         const MeshingSettings& settings)
       : surface_(unit_surface),
+        outside_(unit_surface),
         scale_(box.scale),
         settings_(settings),
         relative_size_(settings.element_size_m != 0
                            ? settings.relative_size.Moved(box.low, box.scale)
                            : SizeField()),
-        shells_(FindShells(surface_)),
-        extent_(Measure(surface_, shells_)) {}
+        has_walls_(wall_count > 0) {
+    outside_.triangles.resize(outside_.triangles.size() - wall_count);
+    shells_ = FindShells(outside_);
+    extent_ = Measure(outside_, shells_);
+  }
 
   absl::StatusOr<TetMesh> Fill() const {
     if (settings_.element_size_m != 0) return FillToElementSize(settings_.element_size_m * scale_);
@@ -302,7 +308,8 @@ class Filler {
     const RefinedSurface refined = RefineSurface(surface_, LongestOnSurface(edge), relative_size_);
     const double max_volume = kVolumeOfRegular * inside * inside * inside;
     FillRequest request{.surface = refined,
-                        .cavities = PointsInCavities(surface_, shells_),
+                        .cavities = PointsInCavities(outside_, shells_),
+                        .has_walls = has_walls_,
                         .max_volume = max_volume,
                         .relative_size = relative_size_,
                         .keep_surface = true,
@@ -353,22 +360,25 @@ class Filler {
   }
 
   const SurfaceMesh& surface_;
-  double scale_;  // of the unit surface to the one given
+  SurfaceMesh outside_;  // without the walls
+  double scale_;         // of the unit surface to the one given
   const MeshingSettings& settings_;
   SizeField relative_size_;  // in the unit box
+  bool has_walls_;
   std::vector<Shell> shells_;
   Extent extent_;
 };
 
 }  // namespace
 
-absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface,
-                                       const MeshingSettings& settings) {
+absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings,
+                                       std::span<const std::array<int32_t, 3>> walls) {
   const double target = settings.target_node_count;
   RETURN_IF_ERROR(CheckNodeCount(target * NodesPerCorner(settings)));
   const UnitBox box = FindUnitBox(surface);
-  const SurfaceMesh unit_surface = ToUnitBox(surface, box);
-  ASSIGN_OR_RETURN(TetMesh mesh, Filler(unit_surface, box, settings).Fill());
+  SurfaceMesh unit_surface = ToUnitBox(surface, box);
+  unit_surface.triangles.insert(unit_surface.triangles.end(), walls.begin(), walls.end());
+  ASSIGN_OR_RETURN(TetMesh mesh, Filler(unit_surface, walls.size(), box, settings).Fill());
   FromUnitBox(mesh, box);
   if (settings.nodes_per_element == 10) AddMidsideNodes(mesh);
   RETURN_IF_ERROR(CheckNodeCount(static_cast<double>(mesh.nodes.size())));

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "absl/status/statusor.h"
 #include "precompute/mesh/size_field.h"
@@ -36,7 +39,11 @@ struct MeshingSettings {
 /// the mesh's boundary stores the given triangle that it lies on. The mesher runs in a child
 /// process, so that a crash of the mesher becomes an ordinary error.
 ///
+/// `walls` are triangles of the surface's vertices, and divide the body into spaces; the mesh then
+/// has the number of a space for each element in TetMesh::regions, and no element crosses a wall.
+///
 /// Errors: MESH_TETRAHEDRALIZATION_FAILED, MESH_TOO_LARGE, OUT_OF_MEMORY.
-absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings);
+absl::StatusOr<TetMesh> Tetrahedralize(const SurfaceMesh& surface, const MeshingSettings& settings,
+                                       std::span<const std::array<int32_t, 3>> walls = {});
 
 }  // namespace carillon::precompute

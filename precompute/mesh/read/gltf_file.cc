@@ -26,9 +26,11 @@ struct GltfScene {
   bool has_lines = false;
 };
 
-/// Adds the triangles of primitives, each with vertices of its own.
-absl::Status Add(const std::vector<GltfSurface>& primitives, GltfScene& scene) {
+/// Adds the triangles of the primitives of a node or mesh, each with vertices of its own. What has
+/// another name or another material is another region.
+absl::Status Add(const std::vector<GltfSurface>& primitives, const Json& named, GltfScene& scene) {
   for (const GltfSurface& surface : primitives) {
+    scene.file.EnterRegion({named.value("name", ""), surface.material});
     const size_t triangle_count = surface.corners.size() / 3;
     scene.has_lines = scene.has_lines || triangle_count == 0;
     if (scene.file.ends.size() + triangle_count > static_cast<size_t>(kMaxSurfaceTriangles)) {
@@ -57,7 +59,7 @@ absl::Status ReadNodes(const GltfDocument& document, const GltfNodes& nodes, Glt
           "it hides a node (KHR_node_visibility): leave out what does not belong to the body");
     }
     if (!node.contains("mesh")) continue;
-    RETURN_IF_ERROR(Add(ReadPlacedMesh(document, n, worlds), scene));
+    RETURN_IF_ERROR(Add(ReadPlacedMesh(document, n, worlds), node, scene));
   }
   return absl::OkStatus();
 }
@@ -65,8 +67,8 @@ absl::Status ReadNodes(const GltfDocument& document, const GltfNodes& nodes, Glt
 absl::Status ReadMeshes(const GltfDocument& document, GltfScene& scene) {
   for (const Json& mesh : document.root().value("meshes", Json::array())) {
     for (const Json& primitive : mesh.at("primitives")) {
-      RETURN_IF_ERROR(
-          Add({ReadPrimitive(document, primitive, mesh.value("weights", Json::array()))}, scene));
+      RETURN_IF_ERROR(Add(
+          {ReadPrimitive(document, primitive, mesh.value("weights", Json::array()))}, mesh, scene));
     }
   }
   return absl::OkStatus();

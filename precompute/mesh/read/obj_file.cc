@@ -28,10 +28,10 @@ constexpr std::string_view kObjRefused[] = {"surf", "bzp", "bsp",  "cdc",
                                             "cdp",  "res", "call", "csh"};
 /// Statements without bounding surface: what surfaces look like, points, lines, and curves.
 constexpr std::string_view kObjIgnored[] = {
-    "vt",        "vn",     "vp",     "p",     "l",    "s",        "mg",       "usemtl",
-    "mtllib",    "maplib", "usemap", "bevel", "lod",  "c_interp", "d_interp", "shadow_obj",
-    "trace_obj", "cstype", "deg",    "bmat",  "step", "curv",     "curv2",    "parm",
-    "trim",      "hole",   "scrv",   "sp",    "end",  "con",      "ctech",    "stech"};
+    "vt",     "vn",     "vp",    "p",    "l",        "s",        "mg",         "mtllib",
+    "maplib", "usemap", "bevel", "lod",  "c_interp", "d_interp", "shadow_obj", "trace_obj",
+    "cstype", "deg",    "bmat",  "step", "curv",     "curv2",    "parm",       "trim",
+    "hole",   "scrv",   "sp",    "end",  "con",      "ctech",    "stech"};
 
 class ObjParser {
  public:
@@ -71,6 +71,10 @@ class ObjParser {
   absl::Status Take(std::string_view statement, ObjWords words) {
     if (statement == "v") return TakeVertex(words);
     if (statement == "f" || statement == "fo") return TakeFace(words);
+    if (statement == "o") object_ = words.empty() ? "" : std::string(words[0]);
+    if (statement == "usemtl") material_ = words.empty() ? "" : std::string(words[0]);
+    if (statement == "o" || statement == "usemtl") file_.EnterRegion({object_, material_});
+    if (statement == "usemtl") return absl::OkStatus();
     if (statement == "g" || statement == "o") {
       EnterGroups(statement == "g" ? in_groups_ : in_object_,
                   statement == "g" ? words : words.first(std::min<size_t>(words.size(), 1)));
@@ -117,7 +121,7 @@ class ObjParser {
       corners_.resize(corners_.size() - words.size());
       return absl::OkStatus();
     }
-    faces_.push_back({lines_.number(), corners_.size()});
+    faces_.push_back({lines_.number(), corners_.size(), file_.region});
     const auto end = static_cast<int32_t>(corners_.size() - 2 * faces_.size());
     for (auto t = static_cast<int32_t>(end + 2 - static_cast<int32_t>(words.size())); t < end;
          ++t) {
@@ -137,6 +141,7 @@ class ObjParser {
         if (corners_[next] >= count) return OutOfRange(face.line, corners_[next] + 1);
         polygon.push_back(static_cast<int32_t>(corners_[next]));
       }
+      file_.region = face.region;
       file_.AddPolygon(polygon);
     }
     return absl::OkStatus();
@@ -166,6 +171,7 @@ class ObjParser {
   struct Face {
     int line;
     size_t end;  // index after its last corner
+    int32_t region;
   };
 
   TextLines lines_;
@@ -173,6 +179,7 @@ class ObjParser {
   std::vector<int64_t> corners_;
   std::vector<Face> faces_;
   std::vector<size_t> in_groups_, in_object_;
+  std::string object_, material_;
   int unknown_count_ = 0;
   int first_unknown_ = 0;
 };

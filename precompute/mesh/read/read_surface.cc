@@ -67,13 +67,16 @@ Point RoundVertices(std::vector<Point>& vertices) {
   return origin;
 }
 
-/// The corners of all triangles, in the order of the polygons.
-std::vector<std::array<Point, 3>> TrianglesOf(const SurfaceFile& file) {
+/// The corners of all triangles, in the order of the polygons, and the region of each.
+std::vector<std::array<Point, 3>> TrianglesOf(const SurfaceFile& file,
+                                              std::vector<int32_t>& regions) {
   std::vector<std::array<int32_t, 3>> triangles;
   triangles.reserve(file.triangle_count());
   size_t begin = 0;
-  for (const size_t end : file.ends) {
+  for (size_t polygon = 0; polygon < file.ends.size(); ++polygon) {
+    const size_t end = file.ends[polygon];
     Triangulate(std::span(file.corners).subspan(begin, end - begin), file.vertices, triangles);
+    regions.resize(triangles.size(), file.region_of_polygon[polygon]);
     begin = end;
   }
   std::vector<std::array<Point, 3>> corners(triangles.size());
@@ -83,6 +86,20 @@ std::vector<std::array<Point, 3>> TrianglesOf(const SurfaceFile& file) {
     }
   }
   return corners;
+}
+
+/// Leaves out the regions that no triangle has.
+void NameRegions(const std::vector<MeshRegion>& regions, MeshNames& names) {
+  std::vector<int32_t> number(regions.size(), -1);
+  for (int32_t& region : names.triangle_regions) {
+    int32_t& known = number[static_cast<size_t>(region)];
+    if (known < 0) {
+      known = static_cast<int32_t>(names.regions.size());
+      names.regions.push_back(regions[static_cast<size_t>(region)]);
+    }
+    region = known;
+  }
+  if (names.regions == std::vector<MeshRegion>(1)) names.regions.clear();
 }
 
 }  // namespace
@@ -96,7 +113,10 @@ absl::StatusOr<NamedMesh> ReadSurface(const std::string& bytes, const std::strin
                    "the file has no faces: export the body as triangles or polygons");
   }
   const Point origin = RoundVertices(file.vertices);
-  NamedMesh named{MergeVertices(TrianglesOf(file))};
+  std::vector<int32_t> regions;
+  NamedMesh named{MergeVertices(TrianglesOf(file, regions))};
+  named.names.triangle_regions = std::move(regions);
+  NameRegions(file.regions, named.names);
   if (file.has_numbers) {
     for (const Point& p : file.vertices) {
       const auto number = static_cast<int64_t>(named.names.vertices.size());

@@ -60,7 +60,11 @@ class StlText {
       if (word == "facet") {
         RETURN_IF_ERROR(ReadFacet());
       } else if (word == "solid" || word == "endsolid") {
-        stream_.SkipLine();  // the name
+        const std::string_view rest = stream_.rest();
+        const absl::string_view name(rest.data(),
+                                     std::min(rest.size(), rest.find_first_of("\r\n")));
+        if (word == "solid") file_.EnterRegion({std::string(absl::StripAsciiWhitespace(name))});
+        stream_.SkipLine();
         has_ended = word == "endsolid";
       } else if (has_ended && absl::AsciiStrToLower(std::string(stream_.rest())).find("facet") ==
                                   std::string::npos) {
@@ -135,6 +139,7 @@ absl::StatusOr<SurfaceFile> ParseBinaryStl(std::string_view rest) {
     if (rest.size() < kStlHeader)
       return StlUnreadable("it begins neither with \"solid\" nor with a title of 80 bytes");
     const size_t count = TriangleCountOf(rest);
+    file.EnterRegion({absl::StrCat(file.regions.size())});
     if (kStlHeader + kStlTriangle * count > rest.size()) {
       return StlUnreadable(absl::StrCat("its header says that it has ", count, " triangles, and ",
                                         (rest.size() - kStlHeader) / kStlTriangle, " follow"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -23,12 +24,22 @@ struct SurfaceFile {
   bool has_numbers = true;
   std::vector<MeshGroup> groups = {};
   std::vector<std::string> warnings = {};
+  std::vector<MeshRegion> regions = {{}};  ///< each once; the first has no name
+  std::vector<int32_t> region_of_polygon = {};
+  int32_t region = 0;  ///< that of the polygons to come
+
+  /// Lets the polygons to come belong to a region.
+  void EnterRegion(const MeshRegion& entered) {
+    region = static_cast<int32_t>(std::ranges::find(regions, entered) - regions.begin());
+    if (static_cast<size_t>(region) == regions.size()) regions.push_back(entered);
+  }
 
   /// Adds a polygon, unless it has fewer than three corners and bounds nothing.
   void AddPolygon(std::span<const int32_t> polygon) {
     if (polygon.size() < 3) return;
     corners.insert(corners.end(), polygon.begin(), polygon.end());
     ends.push_back(corners.size());
+    region_of_polygon.push_back(region);
   }
 
   /// Adds a triangle with three vertices of its own.
@@ -38,6 +49,7 @@ struct SurfaceFile {
       vertices.push_back(p);
     }
     ends.push_back(corners.size());
+    region_of_polygon.push_back(region);
   }
 
   /// Returns the number of triangles into which the polygons are split.

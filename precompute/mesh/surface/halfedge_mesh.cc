@@ -1,13 +1,29 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/surface/halfedge_mesh.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "precompute/mesh/byte_stream.h"
+#include "precompute/mesh/surface/surface_shells.h"
 
 namespace carillon::precompute {
+
+std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface) {
+  HalfedgeMesh mesh;
+  for (const Point& p : surface.vertices) mesh.add_vertex({p[0], p[1], p[2]});
+  for (const auto& triangle : surface.triangles) {
+    if (IsCollapsed(triangle)) continue;
+    std::array<HalfedgeMesh::Vertex_index, 3> corners;
+    for (size_t i = 0; i < 3; ++i) {
+      corners[i] = HalfedgeMesh::Vertex_index(static_cast<unsigned>(triangle[i]));
+    }
+    if (mesh.add_face(corners) == HalfedgeMesh::null_face()) return std::nullopt;
+  }
+  return mesh;
+}
 
 std::string ToBytes(HalfedgeMesh mesh) {
   mesh.collect_garbage();

@@ -4,6 +4,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
 
+#include <optional>
 #include <string>
 
 #include "precompute/mesh/surface_mesh.h"
@@ -14,6 +15,9 @@ using HalfedgeKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 /// CGAL's mesh of triangles. Its algorithms run in a child process, because CGAL's assertions end
 /// the process.
 using HalfedgeMesh = CGAL::Surface_mesh<HalfedgeKernel::Point_3>;
+
+/// Returns nothing for a surface that is no manifold.
+std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface);
 
 /// Returns the coordinates and corners of a mesh as the bytes that the child process sends to its
 /// parent.

@@ -232,4 +232,17 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   return prepared;
 }
 
+absl::StatusOr<PreparedSurface> PrepareParts(const SurfaceMesh& given,
+                                             const std::vector<int32_t>& region_of_triangle,
+                                             const std::vector<std::string>& names) {
+  ASSIGN_OR_RETURN(JoinedParts joined, JoinParts(given, region_of_triangle, names));
+  PreparedSurface prepared{.surface = std::move(joined.outside),
+                           .given_triangle = {},
+                           .warnings = {},
+                           .walls = std::move(joined.walls),
+                           .parts = std::move(joined.parts)};
+  prepared.given_triangle = NearestGiven(prepared.surface, given);
+  return prepared;
+}
+
 }  // namespace carillon::precompute

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "precompute/mesh/surface/join_parts.h"
 #include "precompute/mesh/surface_mesh.h"
 
 namespace carillon::precompute {
@@ -28,6 +29,9 @@ struct PreparedSurface {
   std::vector<std::string> warnings;
   /// Estimated relative error of the modes' frequencies that the coarsening causes.
   double frequency_error = 0;
+  /// The walls between the parts of a body of several regions, see JoinParts; else empty.
+  std::vector<std::array<int32_t, 3>> walls = {};
+  std::vector<BodyPart> parts = {};
 };
 
 /// Checks a surface. If the settings allow it, repairs a faulty surface in three steps. RepairSoup
@@ -37,5 +41,10 @@ struct PreparedSurface {
 /// MESH_REPAIR_FAILED, MESH_WALL_IMPOSSIBLE.
 absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
                                                const PreparationSettings& settings);
+
+/// Prepares a surface of several regions, of which the body is joined. Errors: those of JoinParts.
+absl::StatusOr<PreparedSurface> PrepareParts(const SurfaceMesh& given,
+                                             const std::vector<int32_t>& region_of_triangle,
+                                             const std::vector<std::string>& names);
 
 }  // namespace carillon::precompute

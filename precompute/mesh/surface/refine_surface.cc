@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "absl/container/flat_hash_map.h"
+#include "absl/container/inlined_vector.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/surface_shells.h"
 
@@ -20,7 +21,10 @@ using Edge = std::pair<int32_t, int32_t>;
 
 Edge EdgeOf(int32_t a, int32_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-/// A closed manifold surface whose edges can be split and flipped.
+/// The triangles of an edge: two, or more at the rim of a wall inside the body.
+using Sides = absl::InlinedVector<int32_t, 2>;
+
+/// A closed surface whose edges can be split and flipped.
 class Refiner {
  public:
   Refiner(const SurfaceMesh& surface, double max_edge_m, const SizeField& relative_size)
@@ -51,7 +55,9 @@ class Refiner {
                                  [&](int32_t v) { return v != edge.first && v != edge.second; });
   }
 
-  bool IsInside(const std::array<int32_t, 2>& sides) { return Given(sides[0]) == Given(sides[1]); }
+  bool IsInside(const Sides& sides) {
+    return sides.size() == 2 && Given(sides[0]) == Given(sides[1]);
+  }
 
   void Add(const std::array<int32_t, 3>& triangle, int32_t given_triangle) {
     const auto t = static_cast<int32_t>(refined_.surface.triangles.size());
@@ -60,12 +66,11 @@ class Refiner {
     for (size_t i = 0; i < 3; ++i) Attach(EdgeOf(triangle[i], triangle[(i + 1) % 3]), t);
   }
 
-  /// The first call for an edge notes one side, the second the other.
+  /// Each call for an edge notes one side.
   void Attach(const Edge& edge, int32_t t) {
-    const auto [found, is_new] = triangles_of_edge_.try_emplace(edge, std::array{t, t});
-    if (is_new) return;
-    found->second[1] = t;
-    NoteIfLong(edge);
+    Sides& sides = triangles_of_edge_[edge];
+    sides.push_back(t);
+    if (sides.size() > 1) NoteIfLong(edge);
   }
 
   void Reattach(const Edge& edge, int32_t from, int32_t to) {
@@ -95,15 +100,16 @@ class Refiner {
   }
 
   void Split(const Edge& edge) {
-    const std::array<int32_t, 2> sides = triangles_of_edge_.at(edge);
-    const Edge apexes{Apex(sides[0], edge), Apex(sides[1], edge)};
+    const Sides sides = triangles_of_edge_.at(edge);
+    std::vector<int32_t> apexes;
+    apexes.reserve(sides.size());
+    for (const int32_t t : sides) apexes.push_back(Apex(t, edge));
     triangles_of_edge_.erase(edge);
     const auto middle = static_cast<int32_t>(refined_.surface.vertices.size());
     refined_.surface.vertices.push_back(SplitPoint(edge));
     for (const int32_t t : sides) SplitTriangle(t, edge, middle);
     for (const int32_t end : {edge.first, edge.second}) {
-      for (const int32_t apex : {apexes.first, apexes.second})
-        suspects_.push_back(EdgeOf(end, apex));
+      for (const int32_t apex : apexes) suspects_.push_back(EdgeOf(end, apex));
     }
     MakeDelaunay();
   }
@@ -145,7 +151,7 @@ class Refiner {
 
   /// The angles that face a Delaunay edge sum to at most pi.
   void FlipIfNotDelaunay(const Edge& edge) {
-    const std::array<int32_t, 2> sides = triangles_of_edge_.at(edge);
+    const Sides& sides = triangles_of_edge_.at(edge);
     const int32_t c = Apex(sides[0], edge), d = Apex(sides[1], edge);
     const Point ca = Difference(Vertex(edge.first), Vertex(c));
     const Point cb = Difference(Vertex(edge.second), Vertex(c));
@@ -158,7 +164,7 @@ class Refiner {
   }
 
   void Flip(const Edge& edge, const Edge& apexes) {
-    const std::array<int32_t, 2> sides = triangles_of_edge_.at(edge);
+    const Sides sides = triangles_of_edge_.at(edge);
     triangles_of_edge_.erase(edge);
     std::ranges::replace(Triangle(sides[0]), edge.second, apexes.second);
     std::ranges::replace(Triangle(sides[1]), edge.first, apexes.first);
@@ -183,7 +189,7 @@ class Refiner {
   const SizeField& relative_size_;
   bool edges_inside_too_ = false;
   RefinedSurface refined_;
-  absl::flat_hash_map<Edge, std::array<int32_t, 2>> triangles_of_edge_;
+  absl::flat_hash_map<Edge, Sides> triangles_of_edge_;
   // By relative length, then by vertices, so that the same surface is always split alike.
   std::priority_queue<std::tuple<double, int32_t, int32_t>> long_edges_;
   std::vector<Edge> suspects_;

@@ -20,8 +20,8 @@ struct RefinedSurface {
 /// at the middle of the edge. The edges of the given triangles are split first, so that a long thin
 /// triangle is split across its length. The edges inside the given triangles follow, always the
 /// longest one first. Inside each given triangle, edges are flipped until they are Delaunay (Lawson
-/// 1977), which keeps angles large. Collapsed triangles are left out. The surface must be closed
-/// and manifold.
+/// 1977), which keeps angles large. Collapsed triangles are left out. The surface must be closed,
+/// and manifold but for walls inside it.
 RefinedSurface RefineSurface(const SurfaceMesh& surface, double max_edge_m,
                              const SizeField& relative_size = {});
 

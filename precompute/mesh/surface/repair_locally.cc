@@ -51,21 +51,6 @@ constexpr double kFlatFacePart = 1e-5;
 constexpr int kMostRings = 3;
 constexpr std::chrono::seconds kMostRepairCpu(60);
 
-/// Returns nothing for a surface that is no manifold.
-std::optional<HalfedgeMesh> ToHalfedges(const SurfaceMesh& surface) {
-  HalfedgeMesh mesh;
-  for (const Point& p : surface.vertices) mesh.add_vertex({p[0], p[1], p[2]});
-  for (const auto& triangle : surface.triangles) {
-    if (IsCollapsed(triangle)) continue;
-    std::array<HalfedgeMesh::Vertex_index, 3> corners;
-    for (size_t i = 0; i < 3; ++i) {
-      corners[i] = HalfedgeMesh::Vertex_index(static_cast<unsigned>(triangle[i]));
-    }
-    if (mesh.add_face(corners) == HalfedgeMesh::null_face()) return std::nullopt;
-  }
-  return mesh;
-}
-
 Point At(const HalfedgeMesh& mesh, HalfedgeMesh::Vertex_index vertex) {
   const auto& p = mesh.point(vertex);
   return {p.x(), p.y(), p.z()};

@@ -106,6 +106,10 @@ GltfSurface ReadPrimitive(const GltfDocument& document, const Json& primitive,
   if (mode < kTriangles) return {};
   if (mode > kFan) throw GltfFault(absl::StrCat("a primitive has the mode ", mode));
   GltfSurface surface;
+  if (primitive.contains("material")) {
+    const Json& number = primitive.at("material");
+    surface.material = document.At("materials", number).value("name", number.dump());
+  }
   surface.points = ReadPoints(document, primitive.at("attributes").at("POSITION"));
   Morph(document, primitive.value("targets", Json::array()), weights, surface.points);
   // Without an accessor each vertex is one corner.

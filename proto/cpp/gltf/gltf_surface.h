@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "proto/cpp/gltf/gltf_document.h"
@@ -15,6 +16,7 @@ namespace carillon {
 struct GltfSurface {
   std::vector<GltfPoint> points;
   std::vector<uint32_t> corners;  ///< three indices into `points` for each triangle
+  std::string material;           ///< its name, or its number if it has none; empty: no material
 };
 
 /// Returns the triangles of a primitive in the frame of its mesh: those of lists, strips and fans,

@@ -52,6 +52,26 @@ void ExpectSameTriangles(const SurfaceMesh& read, const SurfaceMesh& written) {
   }
 }
 
+TEST_F(ReadSurfaceTest, ObjectsMaterialsAndSolidsAreRegions) {
+  const absl::StatusOr<NamedMesh> obj = ReadNamed(
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no head\nusemtl steel\nf 1 3 2\no grip\nf 1 2 4\n"
+      "usemtl ash\nf 2 3 4 1\no head\nusemtl steel\nf 3 1 4\n",
+      "obj");
+  ASSERT_TRUE(obj.ok()) << obj.status();
+  EXPECT_EQ(obj->names.regions,
+            (std::vector<MeshRegion>{{"head", "steel"}, {"grip", "steel"}, {"grip", "ash"}}));
+  EXPECT_EQ(obj->names.triangle_regions, (std::vector<int32_t>{0, 1, 2, 2, 0}));
+  const std::string facet =
+      "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+      "0\nendloop\nendfacet\n";
+  const absl::StatusOr<NamedMesh> stl = ReadNamed(
+      "solid the head\n" + facet + facet + "endsolid the head\nsolid \n" + facet + "endsolid\n",
+      "stl");
+  ASSERT_TRUE(stl.ok()) << stl.status();
+  EXPECT_EQ(stl->names.regions, (std::vector<MeshRegion>{{"the head"}, {}}));
+  EXPECT_EQ(stl->names.triangle_regions, (std::vector<int32_t>{0, 0, 1}));
+}
+
 TEST_F(ReadSurfaceTest, EveryFormatGivesTheTrianglesInTheOrderWritten) {
   const SurfaceMesh tube = MakeTubeSurface({.around = 12, .along = 10});
   for (const FileOfKind& file : EveryKind(tube)) {
