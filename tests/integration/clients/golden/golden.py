@@ -12,8 +12,8 @@ STEP_S = 1 / 64
 
 
 def make_trace(model):
-    """Two bars, one twice as large, the other turned over: struck by wood, resting, sliding, pausing and colliding in slow
-    motion."""
+    """Two bars, one twice as large, the other turned over: struck by wood, resting, sliding, pausing and colliding
+    in slow motion."""
     trace = carillon.Trace(STEP_S, simulator="golden", frame="object")
     trace.add(model, "chime_aluminum", radiation="paper_coupling", label="low", size=2)
     trace.add(model, "chime_aluminum", radiation="paper_coupling", label="high", gain=0.5,
@@ -24,9 +24,9 @@ def make_trace(model):
             [1, 2], [(0.125, 0.016, 0), (0.0625, 0, 0.01)], [(0, 0, 0.0625), (0, i / 256, -0.03125)], partners=[0, 9],
             travel_speeds=[0, 0.5], roughness_depth=0.25, irregularity_length=0.001))
     trace.step(0.25, time_scale=0)
-    trace.step(0.5, time_scale=0.5, impacts=carillon.Impacts(1, [(0.25, 0, 0.01)], [(0, 0.5, 0)], durations=0.0009765625,
-                                                               time_offsets=0.0078125, second_objects=2,
-                                                               second_points=[(0, 0, 0)]))
+    trace.step(0.5, time_scale=0.5, impacts=carillon.Impacts(
+        1, [(0.25, 0, 0.01)], [(0, 0.5, 0)], durations=0.0009765625, time_offsets=0.0078125, second_objects=2,
+        second_points=[(0, 0, 0)]))
     return trace
 
 
