@@ -22,8 +22,8 @@ struct RegionMaterial {
 class BodyMaterials {
  public:
   /// One material for the whole body.
-  BodyMaterials(const ElasticConstants& elastic,
-                double density_kg_per_m3 = 1)  // NOLINT(*explicit*)
+  // NOLINTNEXTLINE(google-explicit-constructor): most bodies have one material.
+  BodyMaterials(const ElasticConstants& elastic, double density_kg_per_m3 = 1)
       : BodyMaterials(std::vector{RegionMaterial{"", elastic, density_kg_per_m3}}) {}
   /// The materials of the regions, in the order of the numbers in TetMesh::regions.
   explicit BodyMaterials(std::vector<RegionMaterial> regions) : regions_(std::move(regions)) {
