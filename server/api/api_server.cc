@@ -225,6 +225,9 @@ absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
 }
 
 void ApiServer::State::Open() {
+  // A client that asks before the first look would learn that these services are unknown.
+  edge->SetHealth(v1::ModalModelService::service_full_name(), stores);
+  edge->SetHealth(v1::DecompositionService::service_full_name(), stores && decomposes);
   edge->Open([this] {
     keep_clients.Start();
     keep_database.Start();
