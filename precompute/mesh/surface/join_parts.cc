@@ -60,7 +60,7 @@ std::vector<Rim> RimsOf(const std::vector<Corners>& triangles) {
       rim.push_back(at->second);
       next.erase(at);
     }
-    std::ranges::rotate(rim, std::ranges::min_element(rim));
+    std::rotate(rim.begin(), std::ranges::min_element(rim), rim.end());
     rims.push_back(std::move(rim));
   }
   return rims;
