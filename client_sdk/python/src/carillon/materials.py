@@ -148,7 +148,7 @@ def modes_of(eigenvalues: numpy.ndarray, given: material_pb2.Material,
     docs/physics.md."""
     omega = numpy.sqrt(eigenvalues * given.young_pa / given.density_kg_per_m3) / size
     damping = [(entry.material, numpy.array(region.strain_energy_parts), numpy.array(region.kinetic_energy_parts))
-               for entry, region in zip(given.regions, regions)] or [(given, 1.0, 1.0)]
+               for entry, region in zip(given.regions, regions)] or [(given, numpy.ones(1), numpy.ones(1))]
     decay = numpy.zeros_like(omega)
     for of_region, strain, kinetic in damping:
         eta = loss_factor_at(of_region, omega / (2 * numpy.pi))
