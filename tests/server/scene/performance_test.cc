@@ -41,12 +41,29 @@ class PerformanceTest : public testing::Test {
     return performance;
   }
 
-  void Fill(Environment& environment) {
+  /// The offline renderer of what one environment of these settings hears.
+  std::unique_ptr<OfflineRenderer> MakeOffline(const EnvironmentSettings& settings) {
+    auto offline = *OfflineRenderer::Make(
+        {.sample_rate_hz = kRate,
+         .tail_s = 1,
+         .gain = 10,
+         .full_scale_pa = settings.full_scale_pa,
+         .step_s = kStepS,
+         .space = {.hearing = settings.hearing, .listener = settings.microphones[0].pose},
+         .mapping = {.delay_s = settings.latency_s}},
+        bodies_);
+    Fill(offline->forward());
+    return offline;
+  }
+
+  /// Adds the two objects to an environment or a renderer.
+  template <typename Target>
+  void Fill(Target& target) {
     ObjectProperties larger = SmallProperties();
     larger.material.size = 1.7;
     larger.pose = Pose{.position_m = {0.5, 0, 0}};
-    ASSERT_TRUE(environment.AddObject(1, model_, SmallProperties()).ok());
-    ASSERT_TRUE(environment.AddObject(2, model_, larger).ok());
+    ASSERT_TRUE(target.AddObject(1, model_, SmallProperties()).ok());
+    ASSERT_TRUE(target.AddObject(2, model_, larger).ok());
   }
 
   /// Returns the sound of each environment, [channel][frame] of one step after the other.
@@ -104,20 +121,7 @@ TEST_F(PerformanceTest, IsBitForBitAnOfflineRenderingOfItsTrace) {
   auto settings = SettingsWith(0.05, {.pose = {.position_m = {0, 1, 0}}});
   settings.full_scale_pa = 200;
   const std::vector<float> performed = Perform(*Make(settings, 1), kSteps)[0];
-  const auto offline = *OfflineRenderer::Make(
-      {.sample_rate_hz = kRate,
-       .tail_s = 1,
-       .gain = 10,
-       .full_scale_pa = 200,
-       .step_s = kStepS,
-       .space = {.hearing = settings.hearing, .listener = settings.microphones[0].pose},
-       .mapping = {.delay_s = 0.05}},
-      bodies_);
-  ObjectProperties larger = SmallProperties();
-  larger.material.size = 1.7;
-  larger.pose = Pose{.position_m = {0.5, 0, 0}};
-  ASSERT_TRUE(offline->forward().AddObject(1, model_, SmallProperties()).ok());
-  ASSERT_TRUE(offline->forward().AddObject(2, model_, larger).ok());
+  const auto offline = MakeOffline(settings);
   for (int step = 1; step <= kSteps; ++step) {
     ASSERT_TRUE(offline->intake().BeginStep(step * kStepS).ok());
     offline->intake().Strike(ImpulsesOf(0, step));
@@ -142,18 +146,7 @@ TEST_F(PerformanceTest, IsBitForBitAnOfflineRenderingThoughTheScaleOfTimeChanges
   auto settings = SettingsWith(0.05, {.pose = {.position_m = {0, 1, 0}}});
   settings.full_scale_pa = 200;
   const auto performance = Make(settings, 1);
-  const auto offline = *OfflineRenderer::Make(
-      {.tail_s = 1,
-       .gain = 10,
-       .step_s = kStepS,
-       .space = {.hearing = settings.hearing, .listener = settings.microphones[0].pose},
-       .mapping = {.delay_s = 0.05}},
-      bodies_);
-  ObjectProperties larger = SmallProperties();
-  larger.material.size = 1.7;
-  larger.pose = Pose{.position_m = {0.5, 0, 0}};
-  ASSERT_TRUE(offline->forward().AddObject(1, model_, SmallProperties()).ok());
-  ASSERT_TRUE(offline->forward().AddObject(2, model_, larger).ok());
+  const auto offline = MakeOffline(settings);
   std::vector<float> performed;
   double time_s = 0, frames = 0;
   for (int step = 1; step <= kSteps; ++step) {
