@@ -70,7 +70,7 @@ def _check_materials(found):
 
 def _words(scene, found, folder):
     chosen = scene.carillon
-    # What sounds longer than the scene is cut with its end, as a movie cuts it.
+    # A movie ends with its last frame, so that the sound ends there, too.
     length = str((found.matrices.shape[1] - 1) / found.frames_per_s)
     words = ["--material-masses", "--out", folder / "sound.wav", "--length", length, "--tail", length,
              "--channels", chosen.channels, "--gain", f"{chosen.gain_db}dB",

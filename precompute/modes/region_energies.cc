@@ -101,8 +101,8 @@ std::vector<uint8_t> GivenTriangleRegions(const TetMesh& mesh, const SurfaceMesh
 }
 
 std::vector<double> MassMoments(const TetMesh& mesh, const BodyMaterials& materials) {
-  // Of homogeneous coordinates (1, x, y, z): the integral of p p^T over a tetrahedron of volume V
-  // is V/20 (s s^T + sum of p_i p_i^T), where s is the sum of its corners p_i.
+  // In homogeneous coordinates p = (1, x, y, z), the integral of p p^T over a tetrahedron of volume
+  // V is V/20 (s s^T + sum of p_i p_i^T), where s is the sum of its corners p_i.
   Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     const int32_t* nodes = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];

@@ -92,18 +92,15 @@ Json RadiationSummary(const Transfer& transfer) {
           {"modes_computed", std::ranges::count_if(transfer.modes, &ModeRadiation::computed)}};
 }
 
-/// The decay rate of a mode by the damping of the material or, weighted by their energies, of those
-/// of the regions.
+/// Returns the decay rate that the damping of the material, or of the materials of all regions,
+/// gives a mode, 1/s.
 double DecayRatePerS(const ModalModel& model, size_t m, const IntendedUse& use) {
   if (model.regions.empty()) return use.DecayRatePerS(model.eigenvalues[m]);
-  const double omega = std::sqrt(std::max(0.0, use.Eigenvalue(model.eigenvalues[m])));
   double rate = 0;
   for (const ModelRegion& region : model.regions) {
-    const v1::Material& material = *FindRegion(use.material, region.material.region);
-    const double eta = LossFactorAt(LossFactorOf(material), use.FrequencyHz(model.eigenvalues[m]));
-    rate += (region.strain_parts[m] * (material.alpha1_s() * omega + eta) * omega +
-             region.kinetic_parts[m] * material.alpha2_per_s()) /
-            2;
+    rate += RegionDecayRatePerS(*FindRegion(use.material, region.material.region),
+                                use.FrequencyHz(model.eigenvalues[m]), region.strain_parts[m],
+                                region.kinetic_parts[m]);
   }
   return rate;
 }

@@ -133,19 +133,23 @@ absl::StatusOr<v1::Material> MatchRegions(const v1::ModalModelHeader& header,
   return matched;
 }
 
+double RegionDecayRatePerS(const v1::Material& material, double natural_frequency_hz,
+                           double strain_part, double kinetic_part) {
+  const double omega = 2 * std::numbers::pi * natural_frequency_hz;
+  const double eta = LossFactorAt(LossFactorOf(material), natural_frequency_hz);
+  return (strain_part * (material.alpha1_s() * omega + eta) * omega +
+          kinetic_part * material.alpha2_per_s()) /
+         2;
+}
+
 double DecayRatePerS(const v1::ModalModelHeader& header, const v1::Material& matched, int mode,
                      double natural_frequency_hz) {
   if (header.regions().empty()) return DecayRatePerS(matched, natural_frequency_hz);
-  const double omega = 2 * std::numbers::pi * natural_frequency_hz;
   double rate = 0;
   for (int r = 0; r < header.regions_size(); ++r) {
-    const v1::Material& material = matched.regions(r).material();
-    const double eta = LossFactorAt(LossFactorOf(material), natural_frequency_hz);
-    const double strain = double{header.regions(r).strain_energy_parts(mode)};
-    const double kinetic = double{header.regions(r).kinetic_energy_parts(mode)};
-    rate +=
-        (strain * (material.alpha1_s() * omega + eta) * omega + kinetic * material.alpha2_per_s()) /
-        2;
+    rate += RegionDecayRatePerS(matched.regions(r).material(), natural_frequency_hz,
+                                header.regions(r).strain_energy_parts(mode),
+                                header.regions(r).kinetic_energy_parts(mode));
   }
   return rate;
 }

@@ -37,9 +37,14 @@ absl::Status CheckRegions(const v1::DecompositionSettings& settings);
 absl::StatusOr<v1::Material> MatchRegions(const v1::ModalModelHeader& header,
                                           const v1::Material& resolved);
 
+/// Returns the decay rate that the damping of one region gives a mode, 1/s: (alpha1 omega^2 + eta
+/// omega)/2 times the region's part of the mode's strain energy, and alpha2/2 times its part of the
+/// kinetic energy.
+double RegionDecayRatePerS(const v1::Material& material, double natural_frequency_hz,
+                           double strain_part, double kinetic_part);
+
 /// Returns the decay rate that the damping of a material of MatchRegions gives a mode, 1/s. In a
-/// body of several materials it is the sum over the regions of (alpha1 omega^2 + eta omega)/2 times
-/// the region's part of the strain energy, and of alpha2/2 times its part of the kinetic energy.
+/// body of several materials it is the sum over its regions.
 double DecayRatePerS(const v1::ModalModelHeader& header, const v1::Material& matched, int mode,
                      double natural_frequency_hz);
 

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "server/synthesis/voice/vector3.h"
+
 namespace carillon {
 namespace {
 
@@ -42,10 +44,6 @@ std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
 
 double Magnitude(const std::array<float, 3>& vector) {
   return std::hypot(double{vector[0]}, double{vector[1]}, double{vector[2]});
-}
-
-double Dot(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /// Returns a number from 0 to 1 that looks random but depends only on the arguments, by

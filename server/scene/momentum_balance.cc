@@ -9,6 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include "server/synthesis/voice/vector3.h"
+
 namespace carillon {
 namespace {
 
@@ -37,7 +39,7 @@ constexpr double kForceError = 0.25;
 constexpr double kMostLoadGrowth = 3;
 /// The numbers of substeps that engines make of a step.
 constexpr std::array<int, 7> kSubsteps{2, 3, 4, 5, 8, 10, 16};
-/// Equal impulses in so many steps, on a body that they do not move, are stale.
+/// Equal impulses in this number of steps, on a body that they do not move, are stale.
 constexpr int kStaleSteps = 4;
 /// The speed at which a body leaves its partner for certain, m/s.
 constexpr double kLeastSpeed = 0.05;
@@ -47,10 +49,6 @@ constexpr size_t kMostIdleBodies = 4096;
 Vector3 Sum(const Vector3& a, const Vector3& b, double scale = 1) {
   return {a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]};
 }
-
-double Dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-double Length(const Vector3& v) { return std::sqrt(Dot(v, v)); }
 
 bool IsNear(double ratio, double expected, double error) {
   return std::abs(ratio / expected - 1) <= error;
@@ -97,13 +95,13 @@ void MomentumBalance::EndStep(double time_s) {
   for (const Report& report : reports_) {
     Body& body = bodies_[report.handle];
     Step& step = body.steps.back();
-    Vector3 told{};
-    for (size_t i = 0; i < 3; ++i) told[i] = report.impulse_newton_seconds[i] / report.mass_kg;
+    Vector3 reported{};
+    for (size_t i = 0; i < 3; ++i) reported[i] = report.impulse_newton_seconds[i] / report.mass_kg;
     step.touches = true;
-    step.told = Sum(step.told, Rotated(told, body.orientation));
-    step.told_otherwise =
-        Sum(step.told_otherwise,
-            scene_frame_ ? Rotated(Rotated(told, body.orientation), body.orientation) : told);
+    step.reported = Sum(step.reported, Rotated(reported, body.orientation));
+    step.reported_otherwise = Sum(
+        step.reported_otherwise,
+        scene_frame_ ? Rotated(Rotated(reported, body.orientation), body.orientation) : reported);
   }
   for (const uint32_t handle : empty_touches_) {
     const auto found = bodies_.find(handle);
@@ -144,9 +142,9 @@ void MomentumBalance::EndStep(Body& body, uint32_t handle) {
   body.moves_now = false;
   if (body.steps.size() > 1) {
     const Step& before = body.steps[body.steps.size() - 2];
-    const double size = Length(now.told);
-    now.repeats = size > 0 && (now.told_otherwise == before.told_otherwise ||
-                               Length(Sum(now.told, before.told, -1)) < 1e-6 * size);
+    const double size = Length(now.reported);
+    now.repeats = size > 0 && (now.reported_otherwise == before.reported_otherwise ||
+                               Length(Sum(now.reported, before.reported, -1)) < 1e-6 * size);
   }
   NoteRest(body);
   if (!now.moved) return;
@@ -187,14 +185,14 @@ void MomentumBalance::NoteRest(Body& body) {
   for (const Step& step : std::span(body.steps).last(kSteps)) {
     const bool still =
         step.moved ? Length(step.leap) <= 0.2 * Gravity() * step.step_s : !body.centre_m;
-    if (!still || Length(step.told) == 0) return;
+    if (!still || Length(step.reported) == 0) return;
   }
   // A blow on a body whose motion is not known is no load.
   const Step& before = body.steps[body.steps.size() - 2];
-  if (Length(body.steps.back().told) > kMostLoadGrowth * Length(before.told)) return;
+  if (Length(body.steps.back().reported) > kMostLoadGrowth * Length(before.reported)) return;
   ++body.rest_count;
   body.rest_s += body.steps.back().step_s;
-  body.rest_told = Sum(body.rest_told, body.steps.back().told);
+  body.rest_reported = Sum(body.rest_reported, body.steps.back().reported);
 }
 
 /// The same impulse again and again, that does not move the body: a load on a body that falls, or
@@ -206,15 +204,16 @@ void MomentumBalance::NoteStale(Body& body) {
     body.thrown = false;
     return;
   }
-  const double told = Length(now.told);
+  const double reported = Length(now.reported);
   const double leap = Length(now.leap);
   const double weight = Gravity() * now.step_s;
-  const double away = Dot(now.velocity, now.told) / told;
-  const bool throws = Dot(now.leap, now.told) > kSameDirection * leap * told;
-  if (leap > kLeapSteps * weight && told < kNothing * leap && throws) body.thrown = true;
-  const bool falls = IsNear(told, weight, kUnexplained) && Dot(now.leap, now.told) < 0 &&
-                     Length(Sum(now.leap, now.told)) <= kUnexplained * told;
-  const bool ignored = body.flew && told > kLeapSteps * weight && leap < kUnexplained * told;
+  const double away = Dot(now.velocity, now.reported) / reported;
+  const bool throws = Dot(now.leap, now.reported) > kSameDirection * leap * reported;
+  if (leap > kLeapSteps * weight && reported < kNothing * leap && throws) body.thrown = true;
+  const bool falls = IsNear(reported, weight, kUnexplained) && Dot(now.leap, now.reported) < 0 &&
+                     Length(Sum(now.leap, now.reported)) <= kUnexplained * reported;
+  const bool ignored =
+      body.flew && reported > kLeapSteps * weight && leap < kUnexplained * reported;
   if (falls || (away > kLeastSpeed && (body.thrown || ignored))) ++body.stale_run;
   if (body.stale_run == kStaleSteps) body.stale_count += kStaleSteps - 1;
   if (body.stale_run >= kStaleSteps) ++body.stale_count;
@@ -243,26 +242,27 @@ void MomentumBalance::NoteLeap(Body& body, uint32_t handle) {
 }
 
 MomentumBalance::Fit MomentumBalance::FitTo(const Leap& leap, int delay_steps,
-                                            Vector3 Step::*told) const {
-  double leaps = 0, both = 0, tolds = 0;
+                                            Vector3 Step::*reported) const {
+  double leaps = 0, both = 0, reports_squared = 0;
   for (size_t i = leap.first - 1; i <= leap.last + 1; ++i) {
     const Step& step = leap.steps[i];
     const Vector3 free = Sum(step.leap, gravity_, -step.step_s);
-    const Vector3& is = leap.steps[i + static_cast<size_t>(delay_steps)].*told;
+    const Vector3& is = leap.steps[i + static_cast<size_t>(delay_steps)].*reported;
     leaps += Dot(free, free);
     both += Dot(free, is);
-    tolds += Dot(is, is);
+    reports_squared += Dot(is, is);
   }
-  if (!(tolds > 0)) return {};
-  return {.ratio = tolds / both, .unexplained = 1 - both * both / (leaps * tolds)};
+  if (!(reports_squared > 0)) return {};
+  return {.ratio = reports_squared / both,
+          .unexplained = 1 - both * both / (leaps * reports_squared)};
 }
 
 bool MomentumBalance::IsFirstZero(const Leap& leap) const {
   const Step& begin = leap.steps[leap.first];
   const Step& before = leap.steps[leap.first - 1];
   const double most = kNothing * Length(begin.leap);
-  if (Length(begin.leap) < kUnexplained * leap.size || Length(before.told) > most ||
-      Length(begin.told) > most) {
+  if (Length(begin.leap) < kUnexplained * leap.size || Length(before.reported) > most ||
+      Length(begin.reported) > most) {
     return false;
   }
   for (const size_t early : {size_t{0}, size_t{1}}) {
@@ -270,7 +270,7 @@ bool MomentumBalance::IsFirstZero(const Leap& leap) const {
     for (size_t i = leap.first + 1; i <= leap.last; ++i) {
       const Step& step = leap.steps[i];
       unexplained +=
-          Length(Sum(Sum(step.leap, gravity_, -step.step_s), leap.steps[i - early].told, -1));
+          Length(Sum(Sum(step.leap, gravity_, -step.step_s), leap.steps[i - early].reported, -1));
     }
     if (unexplained <= kUnexplained * leap.size + leap.weight) return true;
   }
@@ -294,20 +294,20 @@ void MomentumBalance::Judge(Body& body, uint32_t handle, size_t first, size_t la
   if (leap.size < kLeapSteps * leap.weight || way > 2 * leap.size + leap.weight) return;
   if (std::ranges::none_of(all.subspan(first - 1), touches)) return;
   ++judged_count_;
-  const auto fits = [&](std::initializer_list<int> delays, Vector3 Step::*told) {
+  const auto fits = [&](std::initializer_list<int> delays, Vector3 Step::*reported) {
     Fit best{};
     for (const int delay : delays) {
-      const Fit fit = FitTo(leap, delay, told);
+      const Fit fit = FitTo(leap, delay, reported);
       if (fit.unexplained < best.unexplained) best = fit;
     }
     return best;
   };
   // The poses are those after the step, or those before it.
-  const Fit in_time = fits({0, -1}, &Step::told);
-  const Fit late = fits({1, 2}, &Step::told);
-  const Fit otherwise = fits({0, -1}, &Step::told_otherwise);
-  const bool begins = std::ranges::none_of(all.subspan(first - 2, 2),
-                                           [](const Step& step) { return Length(step.told) > 0; });
+  const Fit in_time = fits({0, -1}, &Step::reported);
+  const Fit late = fits({1, 2}, &Step::reported);
+  const Fit otherwise = fits({0, -1}, &Step::reported_otherwise);
+  const bool begins = std::ranges::none_of(
+      all.subspan(first - 2, 2), [](const Step& step) { return Length(step.reported) > 0; });
   const bool first_is_zero = begins && IsFirstZero(leap);
   if (first_is_zero && std::ranges::any_of(all.subspan(first - 1, 2), touches)) {
     return Add(EngineMistake::kFirstZero, handle);
@@ -331,9 +331,10 @@ void MomentumBalance::Judge(Body& body, uint32_t handle, size_t first, size_t la
 
 /// An engine may report the whole blow in the last of its steps.
 bool MomentumBalance::IsToldInAll(const Leap& leap, const Vector3& sum) {
-  Vector3 told{};
-  for (size_t i = leap.first - 1; i <= leap.last; ++i) told = Sum(told, leap.steps[i].told);
-  return Length(Sum(told, sum, -1)) <= kUnexplained * leap.size + leap.weight;
+  Vector3 reported{};
+  for (size_t i = leap.first - 1; i <= leap.last; ++i)
+    reported = Sum(reported, leap.steps[i].reported);
+  return Length(Sum(reported, sum, -1)) <= kUnexplained * leap.size + leap.weight;
 }
 
 void MomentumBalance::NoteRight(Body& body) {
@@ -396,7 +397,7 @@ std::optional<double> MomentumBalance::RatioOfBlows(const Body& body) const {
 
 /// Returns the load of a body that rests, over its weight.
 double MomentumBalance::RatioOfRest(const Body& body) const {
-  return Length(body.rest_told) / (Gravity() * body.rest_s);
+  return Length(body.rest_reported) / (Gravity() * body.rest_s);
 }
 
 /// Returns the mistake that the load of a body shows.
@@ -409,7 +410,8 @@ std::optional<EngineMistake> MomentumBalance::ShownByRest(const Body& body) cons
     return EngineMistake::kForces;
   }
   if (!knows_weight) return std::nullopt;
-  const double upwards = -Dot(body.rest_told, gravity_) / (Length(body.rest_told) * Gravity());
+  const double upwards =
+      -Dot(body.rest_reported, gravity_) / (Length(body.rest_reported) * Gravity());
   if (right_count_ == 0 && upwards < -kSameDirection && IsNear(ratio, 1, kUnexplained)) {
     return EngineMistake::kReversed;
   }

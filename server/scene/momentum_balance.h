@@ -48,7 +48,7 @@ using EngineMistakes = std::array<MistakeSize, kEngineMistakeCount>;
 /// A blow is judged in all: the leap of the momentum between times in which it does not leap, and
 /// the sum of the impulses in these steps. So a contact that is spread over several steps counts as
 /// one. A leap without any contact, such as that of a body that is moved by hand or by a joint, is
-/// no blow. A mistake is told only if most blows of the simulation show the same one. Bodies at
+/// no blow. A mistake is reported only if most blows of the simulation show the same one. Bodies at
 /// rest show the ratio of their load to their weight.
 ///
 /// Bodies without poses are judged by what they cannot do: to carry 9.81 m/s^2 over the step in
@@ -87,13 +87,14 @@ class MomentumBalance {
   /// A step of a body, as changes of its speed, m/s, in the scene's frame.
   struct Step {
     double step_s = 0;
-    bool moved = false;        // whether `leap` is known
-    bool touches = false;      // whether a contact is reported, even without an impulse
-    bool repeats = false;      // whether the impulse is exactly that of the step before
-    Vector3 velocity{};        // V_k
-    Vector3 leap{};            // V_k - V_{k-1}
-    Vector3 told{};            // J_k / m
-    Vector3 told_otherwise{};  // J_k / m if its frame is the object's and not the scene's, or so
+    bool moved = false;    // whether `leap` is known
+    bool touches = false;  // whether a contact is reported, even without an impulse
+    bool repeats = false;  // whether the impulse is exactly that of the step before
+    Vector3 velocity{};    // V_k
+    Vector3 leap{};        // V_k - V_{k-1}
+    Vector3 reported{};    // J_k / m
+    Vector3
+        reported_otherwise{};  // J_k / m if its frame is the object's and not the scene's, or so
   };
   static constexpr size_t kStepCount = 16;
 
@@ -112,7 +113,7 @@ class MomentumBalance {
     // A load.
     uint64_t rest_count = 0;
     double rest_s = 0;
-    Vector3 rest_told{};
+    Vector3 rest_reported{};
     // The ratios of the blows whose direction is right, and other verdicts.
     std::vector<double> ratios{};
     uint64_t right_count = 0, lost_count = 0, stale_count = 0;
@@ -137,7 +138,7 @@ class MomentumBalance {
     double unexplained = 1;  // the part of the square of the leaps that these do not explain
   };
   /// Fits the impulses of the steps `delay_steps` later to the blow.
-  Fit FitTo(const Leap& leap, int delay_steps, Vector3 Step::*told) const;
+  Fit FitTo(const Leap& leap, int delay_steps, Vector3 Step::*reported) const;
   void NoteRight(Body& body);
   /// Returns whether the impulses explain a blow but for its first step, which has none.
   bool IsFirstZero(const Leap& leap) const;

@@ -29,7 +29,7 @@ STRIKES = {
     "bar_steel": ("bar", "structural_steel", "steel", 1, 4),
     "chime": ("chime", "aluminum_6061", "wood", 1, 5),
 }
-# name: example, what is seen
+# The name of each sound, and the example that it is made of.
 FALLS = {"blocks": "blocks", "rolling_bowl": "bowl"}
 SCENE_HEARING = {"distance_gain": True, "propagation_delay": True, "panning": True}
 

@@ -361,7 +361,7 @@ class Filler {
 
   const SurfaceMesh& surface_;
   SurfaceMesh outside_;  // without the walls
-  double scale_;         // of the unit surface to the one given
+  double scale_;         // size of the given surface over that of the unit surface
   const MeshingSettings& settings_;
   SizeField relative_size_;  // in the unit box
   bool has_walls_;

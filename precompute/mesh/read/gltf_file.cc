@@ -26,8 +26,8 @@ struct GltfScene {
   bool has_lines = false;
 };
 
-/// Adds the triangles of the primitives of a node or mesh, each with vertices of its own. What has
-/// another name or another material is another region.
+/// Adds the triangles of the primitives of a node or mesh, each with vertices of its own. A
+/// primitive with another name or material begins another region.
 absl::Status Add(const std::vector<GltfSurface>& primitives, const Json& named, GltfScene& scene) {
   for (const GltfSurface& surface : primitives) {
     scene.file.EnterRegion({named.value("name", ""), surface.material});

@@ -171,7 +171,7 @@ std::vector<SurfaceMesh> PiecesOf(const SurfaceMesh& region) {
       break;
     }
   }
-  if (pieces.empty()) return {region};  // CheckSurface says what is wrong with it
+  if (pieces.empty()) return {region};  // CheckSurface refuses it by name
   std::vector<SurfaceMesh> surfaces;
   surfaces.reserve(pieces.size());
   for (const auto& [outer, triangles] : pieces) surfaces.push_back(PartOf(region, triangles));
