@@ -41,6 +41,7 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
     : scene_(scene),
       target_(target),
       settings_(settings),
+      blows_(settings.blows),
       mapper_(settings.sample_rate_hz,
               settings.mapping.value_or(TimeMapping{.delay_s = settings.delay_s})),
       time_s_(mapper_.mapping().first_time_s),
@@ -119,7 +120,7 @@ absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::S
   RETURN_IF_ERROR(diagnostics_.Examine(std::span(&struck.felt, 1), added, 1));
   diagnostics_.NoteZero(impulse.contact);
   struck.Add(added);
-  if (settings_.blows == nullptr) return absl::OkStatus();
+  if (blows_ == nullptr) return absl::OkStatus();
   MixerEvent alone = struck.felt.event;
   std::ranges::transform(added,
                          std::get<SurfaceImpulse>(alone.action).impulse_newton_seconds.begin(),
@@ -318,7 +319,7 @@ void ContactIntake::Push(const ForceEvent& force) {
 
 void ContactIntake::AddBlow(uint64_t serial, const MixerEvent& event, BlowRecord blow,
                             double frame) {
-  if (settings_.blows == nullptr) return;
+  if (blows_ == nullptr) return;
   const absl::StatusOr<const SoundingObject*> object = scene_.FindSame(blow.handle, serial);
   if (!object.ok()) return;
   const SurfaceImpulse& impulse = *event.impulse();
@@ -338,7 +339,7 @@ void ContactIntake::AddBlow(uint64_t serial, const MixerEvent& event, BlowRecord
       (std::max({frame, first_frame + lead_frames, 0.0}) - first_frame) / settings_.sample_rate_hz;
   blow.impulse_newton_seconds = impulse.impulse_newton_seconds;
   blow.duration_s = impulse.pulse.duration_s();
-  settings_.blows->push_back(blow);
+  blows_->push_back(blow);
 }
 
 void ContactIntake::Push(MixerEvent& event, double frame) {

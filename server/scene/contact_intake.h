@@ -81,6 +81,10 @@ class ContactIntake {
   /// `scene` and `target` must outlive the intake.
   ContactIntake(Scene& scene, EventTarget& target, const IntakeSettings& settings);
 
+  /// Lists the impulses that are handed on from now on in `blows`, which must outlive the intake,
+  /// or nowhere if it is null. Replaces the list of the settings.
+  void ListBlowsIn(std::vector<BlowRecord>* blows) { blows_ = blows; }
+
   /// Begins the step at simulation time `time_s`. `time_scale` is simulation time over time of the
   /// sound since the step before. At zero the simulation pauses: the sound goes on for a step, and
   /// the contacts and forces of the step are left out. Errors: InvalidArgument (INVALID_STREAM: the
@@ -160,7 +164,7 @@ class ContactIntake {
   /// Hands on a force, or a blow, unless its object was removed meanwhile.
   void Push(const ForceEvent& force) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   void Push(MixerEvent& event, double frame) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
-  /// Adds the blow of `event` to the settings' blows, unless its object, which has this serial, was
+  /// Adds the blow of `event` to the listed blows, unless its object, which has this serial, was
   /// removed meanwhile. `blow` has the handles of the object and of its partner.
   void AddBlow(uint64_t serial, const MixerEvent& event, BlowRecord blow, double frame)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
@@ -177,6 +181,7 @@ class ContactIntake {
   Scene& scene_;
   EventTarget& target_;
   const IntakeSettings settings_;
+  std::vector<BlowRecord>* blows_;
   TimeMapper mapper_;
   double time_s_ = 0;
   bool pauses_ = false;  // whether the step is one of a pause

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "proto/cpp/error_reason.h"
@@ -37,18 +38,27 @@ constexpr size_t kMostBytesAtOnce = size_t{4} << 10;
 /// `stream_`. An answer is a snapshot, and a newer answer replaces an answer that waits to be sent.
 class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::StreamContactsResponse> {
  public:
-  ContactCall(const ContactContext& daemon, TraceRecorders& recorders,
+  ContactCall(const ContactContext& daemon, TraceRecorders& recorders, ContactWatchers& watchers,
               const grpc::CallbackServerContext& context, Principal caller, ClientPlace place)
       : StreamWriter(nullptr),
         daemon_(daemon),
         recorders_(recorders),
+        watchers_(watchers),
+        number_(watchers.NumberStream()),
         context_(context),
         caller_(std::move(caller)),
         place_(std::move(place)) {
     StartWriting();
     StartReading();
   }
-  ~ContactCall() override { recording_.End(); }
+  ~ContactCall() override {
+    recording_.End();
+    if (stream_ && watchers_.IsWatched(scene_)) {
+      v1::WatchContactsResponse news;
+      news.set_ended(true);
+      Tell(std::move(news));
+    }
+  }
 
  private:
   absl::Status Take(const v1::StreamContactsRequest& request) override {
@@ -69,7 +79,10 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   }
 
   void AllRead() override {
-    if (stream_) stream_->intake().Finish();
+    if (stream_) {
+      stream_->intake().Finish();
+      TellBlows();
+    }
     recording_.End();
     Settle();
   }
@@ -84,14 +97,14 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
       return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_STREAM",
                      "the stream was started twice; open another call for another scene");
     }
-    ASSIGN_OR_RETURN(const uint64_t scene, daemon_.owners.Parse(context_, caller_, start.scene()));
+    ASSIGN_OR_RETURN(scene_, daemon_.owners.Parse(context_, caller_, start.scene()));
     ContactStreamSettings settings;
     settings.step_s = start.step_s();
     if (start.has_scheduling_delay_s()) settings.scheduling_delay_s = start.scheduling_delay_s();
     settings.at_once = start.at_once();
     settings.reading = ToContactReading(start.frame(), start.pulse_shape());
-    ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene, settings));
-    recording_ = StreamRecording(daemon_.scenes, scene, start, recorders_.Take(scene));
+    ASSIGN_OR_RETURN(stream_, daemon_.scenes.OpenContactStream(scene_, settings));
+    recording_ = StreamRecording(daemon_.scenes, scene_, start, recorders_.Take(scene_));
     Answer();
     return absl::OkStatus();
   }
@@ -102,11 +115,32 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
                      "the first request of a contact stream must be start");
     }
     if (recording_.active()) recording_.BeginStep();
+    stream_->intake().ListBlowsIn(watchers_.IsWatched(scene_) ? &blows_ : nullptr);
     RETURN_IF_ERROR(ReadStep(step, stream_->intake()));
+    TellBlows();
     if (recording_.active()) recording_.AddStep(step, stream_->intake().mapping());
     const bool first = stream_->counts().step_count == 1;
     if (first || daemon_.clock.Monotonic() >= answer_due_) Answer();
     return absl::OkStatus();
+  }
+
+  /// Tells the watchers of the scene about the impulses since the last call.
+  void TellBlows() {
+    if (blows_.empty()) return;
+    const double begin_s = static_cast<double>(stream_->intake().mapping().first_frame) /
+                           daemon_.output.format().sample_rate_hz;
+    v1::WatchContactsResponse news;
+    for (BlowRecord& blow : blows_) {
+      blow.time_s += begin_s;
+      *news.add_blows() = ToProto(blow);
+    }
+    blows_.clear();
+    Tell(std::move(news));
+  }
+
+  void Tell(v1::WatchContactsResponse news) {
+    news.set_stream(number_);
+    watchers_.Tell(scene_, std::move(news));
   }
 
   /// Ends the call once the mixer has taken all impulses, so that the last counts are final. No
@@ -125,6 +159,11 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
   void Answer() {
     answer_due_ = daemon_.clock.Monotonic() + kAnswerPeriod;
     v1::StreamContactsResponse answer = Snapshot();
+    if (watchers_.IsWatched(scene_)) {
+      v1::WatchContactsResponse news;
+      *news.mutable_report() = answer;
+      Tell(std::move(news));
+    }
     {
       const MutexLock lock(&mutex_);
       waiting_ = std::move(answer);
@@ -176,6 +215,10 @@ class ContactCall final : public BidiStream<v1::StreamContactsRequest, v1::Strea
 
   const ContactContext daemon_;
   TraceRecorders& recorders_;
+  ContactWatchers& watchers_;
+  const uint64_t number_;
+  uint64_t scene_ = 0;
+  std::vector<BlowRecord> blows_;
   StreamRecording recording_;
   const grpc::CallbackServerContext& context_;
   const Principal caller_;
@@ -222,18 +265,57 @@ class RecordCall final : public ServerStream<v1::RecordContactsResponse> {
   bool begun_ = false;
 };
 
+/// Sends the news of the streams of a scene.
+class WatchCall final : public ServerStream<v1::WatchContactsResponse> {
+ public:
+  WatchCall(ContactWatchers& watchers, const absl::StatusOr<uint64_t>& scene, ClientPlace place)
+      : StreamWriter(nullptr), place_(std::move(place)), status_(scene.status()) {
+    watcher_ = std::make_shared<ContactWatcher>(scene.value_or(0), [this] { Wake(); });
+    if (status_.ok()) watchers.Add(watcher_);
+    StartWriting();
+  }
+  /// A stream may hold the watcher longer than this call lives.
+  ~WatchCall() override { watcher_->Leave(); }
+
+ private:
+  absl::StatusOr<Supply> Fill(v1::WatchContactsResponse& response) override {
+    RETURN_IF_ERROR(status_);
+    if (!std::exchange(begun_, true)) return Supply::kMessage;
+    return watcher_->TryTake(response) ? Supply::kMessage : Supply::kLater;
+  }
+
+  const ClientPlace place_;
+  const absl::Status status_;
+  std::shared_ptr<ContactWatcher> watcher_;
+  bool begun_ = false;
+};
+
 }  // namespace
+
+grpc::ServerWriteReactor<v1::WatchContactsResponse>* ContactService::WatchContacts(
+    grpc::CallbackServerContext* context, const v1::WatchContactsRequest* request) {
+  using Reactor = grpc::ServerWriteReactor<v1::WatchContactsResponse>;
+  const auto make = [&](const Principal& caller, ClientPlace place) -> Reactor* {
+    return new WatchCall(watchers_, Find(*context, caller, request->scene(), SceneCall::kLooks),
+                         std::move(place));
+  };
+  return Open(*context, daemon_.reception, {Role::kStrike, Holding::kListener}, make);
+}
+
+absl::StatusOr<uint64_t> ContactService::Find(const grpc::CallbackServerContext& context,
+                                              const Principal& caller, const std::string& name,
+                                              SceneCall call) const {
+  ASSIGN_OR_RETURN(const uint64_t scene, daemon_.owners.Parse(context, caller, name, call));
+  RETURN_IF_ERROR(daemon_.scenes.BusOf(scene).status());
+  return scene;
+}
 
 grpc::ServerWriteReactor<v1::RecordContactsResponse>* ContactService::RecordContacts(
     grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) {
   using Reactor = grpc::ServerWriteReactor<v1::RecordContactsResponse>;
   const auto make = [&](const Principal& caller, ClientPlace place) -> Reactor* {
-    absl::StatusOr<uint64_t> scene = daemon_.owners.Parse(*context, caller, request->scene());
-    if (scene.ok()) {
-      const absl::Status found = daemon_.scenes.BusOf(*scene).status();
-      if (!found.ok()) scene = found;
-    }
-    return new RecordCall(recorders_, scene, std::move(place));
+    return new RecordCall(recorders_, Find(*context, caller, request->scene(), SceneCall::kUses),
+                          std::move(place));
   };
   return Open(*context, daemon_.reception, {Role::kStrike, Holding::kListener}, make);
 }
@@ -243,7 +325,8 @@ ContactService::StreamContactsRaw(grpc::CallbackServerContext* context) {
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>;
   return Open(*context, daemon_.reception, {Role::kStrike, Holding::kContactStream},
               [&](const Principal& caller, ClientPlace place) -> Reactor* {
-                return new ContactCall(daemon_, recorders_, *context, caller, std::move(place));
+                return new ContactCall(daemon_, recorders_, watchers_, *context, caller,
+                                       std::move(place));
               });
 }
 

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <string>
+
+#include "absl/status/statusor.h"
 #include "carillon/v1/contact_service.grpc.pb.h"
 #include "server/api/call/fair_turns.h"
 #include "server/api/call/raw_service.h"
 #include "server/api/call/reception.h"
 #include "server/api/edge/scene_owners.h"
+#include "server/api/services/contact_watchers.h"
 #include "server/api/services/trace_recorders.h"
 #include "server/base/clock.h"
 #include "server/live_output/live_output.h"
@@ -33,13 +38,20 @@ class ContactService final : public RawService<v1::ContactService> {
 
   grpc::ServerWriteReactor<v1::RecordContactsResponse>* RecordContacts(
       grpc::CallbackServerContext* context, const v1::RecordContactsRequest* request) override;
+  grpc::ServerWriteReactor<v1::WatchContactsResponse>* WatchContacts(
+      grpc::CallbackServerContext* context, const v1::WatchContactsRequest* request) override;
 
  private:
   grpc::ServerBidiReactor<grpc::ByteBuffer, v1::StreamContactsResponse>* StreamContactsRaw(
       grpc::CallbackServerContext* context);
 
+  /// Errors: those of SceneOwners::Parse, NotFound (SCENE_NOT_FOUND).
+  absl::StatusOr<uint64_t> Find(const grpc::CallbackServerContext& context, const Principal& caller,
+                                const std::string& name, SceneCall call) const;
+
   const ContactContext daemon_;
   TraceRecorders recorders_;
+  ContactWatchers watchers_;
 };
 
 }  // namespace carillon

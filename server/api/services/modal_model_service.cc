@@ -175,6 +175,15 @@ grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ModalModelService::Expor
               });
 }
 
+grpc::ServerWriteReactor<v1::GetShapesResponse>* ModalModelService::GetShapes(
+    grpc::CallbackServerContext* context, const v1::GetShapesRequest* request) {
+  return Open(*context, daemon_.reception, {Role::kSubmit, Holding::kExport},
+              [&](const Principal&, ClientPlace place) {
+                return MakeShapes(*context, *request, database_, daemon_.reception.pool,
+                                  BoundsOf(std::move(place)));
+              });
+}
+
 grpc::ServerUnaryReactor* ModalModelService::ListMaterials(grpc::CallbackServerContext* context,
                                                            const v1::ListMaterialsRequest*,
                                                            v1::ListMaterialsResponse* response) {

@@ -54,6 +54,8 @@ class ModalModelService final : public RawService<v1::ModalModelService> {
                                              v1::DeleteModalModelResponse* response) override;
   grpc::ServerWriteReactor<v1::ExportModalModelResponse>* ExportModalModel(
       grpc::CallbackServerContext* context, const v1::ExportModalModelRequest* request) override;
+  grpc::ServerWriteReactor<v1::GetShapesResponse>* GetShapes(
+      grpc::CallbackServerContext* context, const v1::GetShapesRequest* request) override;
   grpc::ServerUnaryReactor* ListMaterials(grpc::CallbackServerContext* context,
                                           const v1::ListMaterialsRequest* request,
                                           v1::ListMaterialsResponse* response) override;

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/api/services/model_streams.h"
 
+#include <algorithm>
+#include <cmath>
 #include <deque>
 #include <iterator>
 #include <memory>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -17,6 +22,7 @@
 #include "server/api/convert/resource_name.h"
 #include "server/api/services/transfer_spool.h"
 #include "server/mode_database/codec/imported_figures.h"
+#include "server/mode_database/codec/modal_model.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {
@@ -127,6 +133,7 @@ class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
   absl::StatusOr<Supply> FillNext(v1::ExportModalModelResponse& response) override {
     if (!export_) RETURN_IF_ERROR(Begin());
     ASSIGN_OR_RETURN(std::optional<v1::ModalModelRecord> record, export_->Next());
+    if (record && request_.without_shapes() && IsShapes(*record)) record = std::nullopt;
     if (record) {
       *response.mutable_record() = *std::move(record);
       return Supply::kMessage;
@@ -147,6 +154,16 @@ class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
     return absl::OkStatus();
   }
 
+  /// Returns whether a record is a chunk of the shapes, which are the last array of a model. Drops
+  /// the array from a header.
+  bool IsShapes(v1::ModalModelRecord& record) {
+    if (!record.has_header()) return record.chunk().array() >= array_count_;
+    auto& arrays = *record.mutable_header()->mutable_arrays();
+    if (!arrays.empty() && arrays.rbegin()->name() == "shapes") arrays.RemoveLast();
+    array_count_ = static_cast<uint32_t>(arrays.size());
+    return false;
+  }
+
   /// Makes the records of the next transfer. Returns false if there is none.
   bool BeginTransfer() {
     if (transfers_.empty()) return false;
@@ -160,8 +177,101 @@ class ExportCall final : public SendCall<v1::ExportModalModelResponse> {
   const v1::ExportModalModelRequest request_;
   ModeDatabase& database_;
   std::optional<ModelExport> export_;
+  uint32_t array_count_ = 0;
   std::deque<StoredTransfer> transfers_;
   std::deque<v1::TransferRecord> records_;
+};
+
+/// Returns `chosen`, or all of `count` if nothing is chosen. Errors: InvalidArgument
+/// (INVALID_SETTINGS).
+absl::StatusOr<std::vector<uint32_t>> Chosen(
+    const google::protobuf::RepeatedField<uint32_t>& chosen, size_t count, absl::string_view what) {
+  std::vector<uint32_t> numbers(chosen.begin(), chosen.end());
+  for (const uint32_t number : numbers) {
+    if (number < count) continue;
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+        absl::StrCat(what, " has ", number, "; the model has ", count, " of them, counted from 0"));
+  }
+  if (!numbers.empty()) return numbers;
+  numbers.resize(count);
+  std::iota(numbers.begin(), numbers.end(), 0);
+  return numbers;
+}
+
+/// Sends the shapes of modes at vertices, mode by mode.
+class ShapesCall final : public SendCall<v1::GetShapesResponse> {
+ public:
+  ShapesCall(grpc::CallbackServerContext& context, const v1::GetShapesRequest& request,
+             ModeDatabase& database, ThreadPool& pool, CallBounds bounds)
+      : SendCall(context, std::move(bounds), pool), request_(request), database_(database) {
+    StartWriting();
+  }
+
+ private:
+  static constexpr size_t kMostVertices = 100'000;
+
+  absl::StatusOr<Supply> FillNext(v1::GetShapesResponse& response) override {
+    if (!model_) RETURN_IF_ERROR(Begin());
+    response.Clear();
+    for (size_t sent = 0; mode_ < modes_.size() && sent < kMostVertices;) {
+      sent += AddPart(*response.add_shapes());
+    }
+    return response.shapes().empty() ? Supply::kEnd : Supply::kMessage;
+  }
+
+  absl::Status Begin() {
+    ASSIGN_OR_RETURN(const std::string digest, ParseModelName(request_.name()));
+    ASSIGN_OR_RETURN(model_, database_.models().Find(digest));
+    ASSIGN_OR_RETURN(modes_, Chosen(request_.modes(), model_->mode_count(), "modes"));
+    ASSIGN_OR_RETURN(vertices_, Chosen(request_.vertices(), model_->vertices.size(), "vertices"));
+    return absl::OkStatus();
+  }
+
+  /// Adds the next vertices of the next mode. Returns their number.
+  size_t AddPart(v1::ModeShape& shape) {
+    const auto rest = std::span(vertices_).subspan(vertex_);
+    const auto part = rest.first(std::min(rest.size(), kMostVertices));
+    std::vector<float> values;
+    values.reserve(3 * part.size());
+    float largest = 0;
+    for (const uint32_t vertex : part) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const float value =
+            model_->shapes[(size_t{3} * vertex + axis) * model_->mode_count() + modes_[mode_]];
+        values.push_back(value);
+        largest = std::max(largest, std::abs(value));
+      }
+    }
+    shape.set_mode(modes_[mode_]);
+    shape.set_first_vertex(static_cast<uint32_t>(vertex_));
+    shape.set_scale(largest / 32767);
+    AppendIntegers(values, largest > 0 ? 32767 / largest : 0, *shape.mutable_components());
+    vertex_ += part.size();
+    if (vertex_ == vertices_.size()) {
+      vertex_ = 0;
+      ++mode_;
+    }
+    return part.size();
+  }
+
+  /// Appends each value times `factor` as 16 bits, little endian.
+  static void AppendIntegers(std::span<const float> values, float factor, std::string& bytes) {
+    bytes.reserve(2 * values.size());
+    for (const float value : values) {
+      const auto integer = static_cast<uint16_t>(static_cast<int16_t>(std::lrint(value * factor)));
+      bytes.push_back(static_cast<char>(integer & 0xffU));
+      bytes.push_back(static_cast<char>(integer >> 8U));
+    }
+  }
+
+  const v1::GetShapesRequest request_;
+  ModeDatabase& database_;
+  std::shared_ptr<const ModalModel> model_;
+  std::vector<uint32_t> modes_;
+  std::vector<uint32_t> vertices_;
+  size_t mode_ = 0;  // places in modes_ and vertices_
+  size_t vertex_ = 0;
 };
 
 }  // namespace
@@ -186,6 +296,13 @@ grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
     grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,
     ModeDatabase& database, ThreadPool& pool, CallBounds bounds) {
   return new ExportCall(context, request, database, pool, std::move(bounds));
+}
+
+grpc::ServerWriteReactor<v1::GetShapesResponse>* MakeShapes(grpc::CallbackServerContext& context,
+                                                            const v1::GetShapesRequest& request,
+                                                            ModeDatabase& database,
+                                                            ThreadPool& pool, CallBounds bounds) {
+  return new ShapesCall(context, request, database, pool, std::move(bounds));
 }
 
 v1::ModalModelSummary ToProto(const ModelSummary& summary) {

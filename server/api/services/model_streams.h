@@ -44,6 +44,11 @@ grpc::ServerWriteReactor<v1::ExportModalModelResponse>* MakeExport(
     grpc::CallbackServerContext& context, const v1::ExportModalModelRequest& request,
     ModeDatabase& database, ThreadPool& pool, CallBounds bounds);
 
+grpc::ServerWriteReactor<v1::GetShapesResponse>* MakeShapes(grpc::CallbackServerContext& context,
+                                                            const v1::GetShapesRequest& request,
+                                                            ModeDatabase& database,
+                                                            ThreadPool& pool, CallBounds bounds);
+
 v1::ModalModelSummary ToProto(const ModelSummary& summary);
 
 }  // namespace carillon

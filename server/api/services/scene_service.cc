@@ -29,6 +29,12 @@ v1::Scene ToProto(const SceneRegistry::SceneEntry& entry) {
   return scene;
 }
 
+void AddSpace(const absl::StatusOr<SceneSpace>& space, v1::Scene& scene) {
+  if (!space.ok()) return;  // the scene was deleted meanwhile
+  *scene.mutable_hearing() = ToProto(space->hearing);
+  *scene.mutable_listener() = ToProto(space->listener);
+}
+
 void AddLease(const LeaseState& lease, v1::Scene& scene) {
   scene.set_keep(lease.keep);
   scene.set_connection_count(static_cast<uint32_t>(lease.connection_count));
@@ -121,6 +127,7 @@ grpc::ServerUnaryReactor* SceneService::ListScenes(grpc::CallbackServerContext* 
       v1::Scene& scene = *response->add_scenes();
       scene = ToProto(entry);
       AddLease(owners_.leases().StateOf(entry.scene), scene);
+      AddSpace(scenes_.SpaceOf(entry.scene), scene);
     }
     return absl::OkStatus();
   });
@@ -234,6 +241,7 @@ absl::Status SceneService::Describe(uint64_t scene, v1::Scene& described) const 
   ASSIGN_OR_RETURN(const SceneRegistry::SceneEntry entry, scenes_.GetScene(scene));
   described = ToProto(entry);
   AddLease(owners_.leases().StateOf(scene), described);
+  AddSpace(scenes_.SpaceOf(scene), described);
   return absl::OkStatus();
 }
 

@@ -60,10 +60,28 @@ class ModelApi : public ServedDaemon {
     return writer->Finish();
   }
 
-  grpc::Status Export(const std::string& name, std::vector<v1::ModalModelRecord>& records) {
+  grpc::Status GetShapes(const std::string& name, const std::vector<uint32_t>& modes,
+                         const std::vector<uint32_t>& vertices,
+                         std::vector<v1::ModeShape>& shapes) {
+    grpc::ClientContext context;
+    v1::GetShapesRequest request;
+    request.set_name(name);
+    request.mutable_modes()->Add(modes.begin(), modes.end());
+    request.mutable_vertices()->Add(vertices.begin(), vertices.end());
+    const auto reader = models->GetShapes(&context, request);
+    v1::GetShapesResponse response;
+    while (reader->Read(&response)) {
+      shapes.insert(shapes.end(), response.shapes().begin(), response.shapes().end());
+    }
+    return reader->Finish();
+  }
+
+  grpc::Status Export(const std::string& name, std::vector<v1::ModalModelRecord>& records,
+                      bool without_shapes = false) {
     grpc::ClientContext context;
     v1::ExportModalModelRequest request;
     request.set_name(name);
+    request.set_without_shapes(without_shapes);
     const auto reader = models->ExportModalModel(&context, request);
     v1::ExportModalModelResponse response;
     while (reader->Read(&response)) records.push_back(response.record());
@@ -177,6 +195,55 @@ TEST_F(ModelApi, WhatIsImportedIsExportedUnchangedAndListed) {
   ASSERT_EQ(listed.modal_models_size(), 1);
   EXPECT_EQ(listed.modal_models(0).name(), name);
   EXPECT_EQ(listed.modal_models(0).eigenvalues_size(), 0);
+}
+
+TEST_F(ModelApi, AnExportWithoutShapesHasEveryOtherArrayUnchanged) {
+  const std::string name = ImportSmallModel();
+  std::vector<v1::ModalModelRecord> whole;
+  ASSERT_TRUE(Export(name, whole).ok());
+  std::vector<v1::ModalModelRecord> rest;
+  ASSERT_TRUE(Export(name, rest, true).ok());
+  const auto shapes_array = static_cast<uint32_t>(whole[0].header().arrays_size() - 1);
+  ASSERT_EQ(whole[0].header().arrays().rbegin()->name(), "shapes");
+  whole[0].mutable_header()->mutable_arrays()->RemoveLast();
+  std::erase_if(whole, [&](const v1::ModalModelRecord& record) {
+    return record.has_chunk() && record.chunk().array() == shapes_array;
+  });
+  ASSERT_EQ(rest.size(), whole.size());
+  for (size_t i = 0; i < rest.size(); ++i) {
+    EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(rest[i], whole[i])) << i;
+  }
+}
+
+TEST_F(ModelApi, ShapesOfModesAtVerticesAreThoseOfTheModelTo16Bits) {
+  const std::string name = ImportSmallModel();
+  const ModalModel& model = *SmallModel();
+  const auto mode_count = static_cast<uint32_t>(model.mode_count());
+  std::vector<v1::ModeShape> shapes;
+  ASSERT_TRUE(GetShapes(name, {mode_count - 1, 0}, {2, 1}, shapes).ok());
+  ASSERT_EQ(shapes.size(), 2U);
+  EXPECT_EQ(shapes[0].mode(), mode_count - 1);
+  EXPECT_EQ(shapes[1].mode(), 0U);
+  for (const v1::ModeShape& shape : shapes) {
+    ASSERT_EQ(shape.components().size(), 12U);
+    for (size_t i = 0; i < 6; ++i) {
+      const size_t row = 3 * (i < 3 ? 2 : 1) + i % 3;
+      const auto low = static_cast<uint8_t>(shape.components()[2 * i]);
+      const auto high = static_cast<uint8_t>(shape.components()[2 * i + 1]);
+      const auto number = static_cast<int16_t>(low | (high << 8U));
+      // Half a step of the 16 bits.
+      EXPECT_NEAR(number * shape.scale(), model.shapes[row * mode_count + shape.mode()],
+                  0.51 * shape.scale());
+    }
+  }
+  shapes.clear();
+  ASSERT_TRUE(GetShapes(name, {}, {}, shapes).ok());
+  ASSERT_EQ(shapes.size(), mode_count);
+  EXPECT_EQ(shapes[0].components().size(), 6 * model.vertices.size());
+  ExpectRefused(GetShapes(name, {mode_count}, {}, shapes), grpc::INVALID_ARGUMENT,
+                "INVALID_SETTINGS");
+  ExpectRefused(GetShapes(name, {}, {1'000'000}, shapes), grpc::INVALID_ARGUMENT,
+                "INVALID_SETTINGS");
 }
 
 TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {

@@ -252,5 +252,44 @@ TEST_F(VolumeApi, AStemEndsWithItsScene) {
   EXPECT_TRUE(reader->Finish().ok());
 }
 
+TEST_F(VolumeApi, AWatcherSeesEachBlowAndTheReportsOfTheStreamsOfItsScene) {
+  const std::string scene = SceneWithObject();
+  const std::string other = SceneWithObject();
+  grpc::ClientContext context;
+  v1::WatchContactsRequest request;
+  request.set_scene(scene);
+  const auto reader = contacts->WatchContacts(&context, request);
+  v1::WatchContactsResponse news;
+  ASSERT_TRUE(reader->Read(&news));
+  EXPECT_EQ(news.stream(), 0U);
+  StrikeLive(other);
+  const v1::StreamContactsResponse last = StrikeLive(scene, 0.25);
+  EXPECT_EQ(last.accepted_count(), 1U);
+  std::vector<v1::Blow> blows;
+  v1::StreamContactsResponse report;
+  while (!news.ended()) {
+    ASSERT_TRUE(reader->Read(&news));
+    EXPECT_EQ(news.stream(), 2U);  // the second stream of the daemon
+    blows.insert(blows.end(), news.blows().begin(), news.blows().end());
+    if (news.has_report()) report = news.report();
+  }
+  EXPECT_EQ(report.SerializeAsString(), last.SerializeAsString());
+  ASSERT_EQ(blows.size(), 1U);
+  EXPECT_EQ(blows[0].object(), 1U);
+  const v1::Vec3& struck = Strike(1).impulse_newton_seconds();
+  EXPECT_NEAR(blows[0].impulse_newton_seconds().x(), struck.x(), 1e-6);
+  EXPECT_NEAR(blows[0].impulse_newton_seconds().y(), struck.y(), 1e-6);
+  EXPECT_NEAR(blows[0].impulse_newton_seconds().z(), struck.z(), 1e-6);
+  // Its time is that of the frames of the output.
+  const double rate_hz = output().format().sample_rate_hz;
+  EXPECT_NEAR(blows[0].time_s(), static_cast<double>(last.first_frame()) / rate_hz + 0.25, 1e-6);
+  context.TryCancel();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  grpc::ClientContext missing;
+  request.set_scene("scenes/99");
+  ExpectRefused(contacts->WatchContacts(&missing, request)->Finish(), grpc::NOT_FOUND,
+                "SCENE_NOT_FOUND");
+}
+
 }  // namespace
 }  // namespace carillon
