@@ -5,8 +5,8 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/performance.pb.h"
-#include "server/scene/environment.h"
 #include "server/scene/head_store.h"
+#include "server/scene/offline/environment.h"
 
 namespace carillon {
 

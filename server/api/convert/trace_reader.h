@@ -10,7 +10,7 @@
 #include "carillon/v1/audio_service.pb.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/head_store.h"
-#include "server/scene/offline_renderer.h"
+#include "server/scene/offline/offline_renderer.h"
 
 namespace carillon {
 

@@ -19,7 +19,7 @@
 #include "server/api/convert/perform_conversion.h"
 #include "server/api/convert/perform_rows.h"
 #include "server/api/convert/sample_bytes.h"
-#include "server/scene/performance.h"
+#include "server/scene/offline/performance.h"
 
 namespace carillon {
 namespace {

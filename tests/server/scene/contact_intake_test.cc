@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "server/scene/offline_renderer.h"
+#include "server/scene/offline/offline_renderer.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/recording_target.h"
 #include "tests/server/scene/small_model.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/mode_database/mode_database.h"
-#include "server/scene/offline_renderer.h"
+#include "server/scene/offline/offline_renderer.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/mode_database/sample_transfer.h"

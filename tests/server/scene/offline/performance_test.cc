@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/performance.h"
+#include "server/scene/offline/performance.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/offline_renderer.h"
+#include "server/scene/offline/offline_renderer.h"
 #include "tests/server/scene/small_model.h"
 #include "tests/server/synthesis/voice/sphere_head.h"
 

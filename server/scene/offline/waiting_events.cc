@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/waiting_events.h"
+#include "server/scene/offline/waiting_events.h"
 
 #include <algorithm>
 

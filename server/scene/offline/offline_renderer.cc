@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/offline_renderer.h"
+#include "server/scene/offline/offline_renderer.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/forward_renderer.h"
+#include "server/scene/offline/forward_renderer.h"
 
 #include <algorithm>
 #include <cmath>

@@ -11,8 +11,8 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
-#include "server/scene/forward_renderer.h"
-#include "server/scene/microphone.h"
+#include "server/scene/offline/forward_renderer.h"
+#include "server/scene/offline/microphone.h"
 
 namespace carillon {
 

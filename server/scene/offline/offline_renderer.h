@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/scene/forward_renderer.h"
+#include "server/scene/offline/forward_renderer.h"
 
 namespace carillon {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/microphone.h"
+#include "server/scene/offline/microphone.h"
 
 #include <utility>
 

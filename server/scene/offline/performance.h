@@ -11,8 +11,8 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "server/scene/environment.h"
-#include "server/scene/microphone.h"
+#include "server/scene/offline/environment.h"
+#include "server/scene/offline/microphone.h"
 #include "server/synthesis/bank/block_mix.h"
 #include "server/synthesis/render_threads.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/performance.h"
+#include "server/scene/offline/performance.h"
 
 #include <algorithm>
 #include <cmath>

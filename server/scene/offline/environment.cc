@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/environment.h"
+#include "server/scene/offline/environment.h"
 
 #include <algorithm>
 #include <cmath>
