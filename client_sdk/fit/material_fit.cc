@@ -15,6 +15,9 @@ namespace {
 
 constexpr size_t kFewestModes = 5;
 constexpr double kLeastLogOdds = 4;
+/// Lines that match by chance are some 0.5 % apart, so that the log odds must be the greater, the
+/// nearer a match comes to that.
+constexpr double kGoodRms = 0.0035, kLogOddsPerRms = 3500;
 constexpr double kMostRms = 0.01;
 /// Part of the measured lines that must be modes of the body.
 constexpr double kLeastMatched = 0.35;
@@ -79,7 +82,9 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
   }
   // The null hypothesis, by which no line is a mode of the body, is a rival, too.
   const double second = std::max(0.0, matches.size() > 1 ? matches[1].score : 0.0);
-  if (best.score - second < kLeastLogOdds) {
+  const double beyond = best.rms > kMostRms ? 0 : std::max(0.0, best.rms - kGoodRms);
+  const double least = kLeastLogOdds + kLogOddsPerRms * beyond;
+  if (best.score - second < least) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MATCH_AMBIGUOUS",
         absl::StrCat(

@@ -16,13 +16,14 @@ using ::testing::HasSubstr;
 constexpr double kYoung_pa = 70e9, kDensity = 2500, kNu = 0.24, kLossFactor = 1e-3;
 
 /// A body of which the lowest modes were measured; its frequencies are those of another body if
-/// `scrambled`.
-FittedBody Body(size_t measured, bool scrambled = false) {
+/// `scrambled`, and off by up to `apart`.
+FittedBody Body(size_t measured, bool scrambled = false, double apart = 0) {
   FittedBody body{.name = "body", .lines = IrregularLines(20), .modes = {}, .volume_m3 = 1e-4};
   const double speed = std::sqrt(kYoung_pa / kDensity);
   for (size_t j = 0; j < measured; ++j) {
     double hz = speed * body.lines.HertzAtUnitSpeed(j, kNu);
     if (scrambled) hz *= 1 + 0.04 * std::sin(5.0 * static_cast<double>(j * j + 1));
+    hz *= 1 + apart * std::cos(3.0 * static_cast<double>(j * j));
     body.modes.push_back({.frequency_hz = hz,
                           .frequency_error_hz = 1e-4 * hz,
                           .decay_per_s = std::numbers::pi * hz * kLossFactor,
@@ -52,6 +53,21 @@ TEST(FitMaterial, RefusesFewLinesAndThoseOfAnotherBody) {
   EXPECT_THAT(FitMaterial({Body(12, true)}, settings).status().ToString(),
               testing::AnyOf(HasSubstr("MATCH_AMBIGUOUS"), HasSubstr("MESH_DISAGREES"),
                              HasSubstr("TOO_FEW_MODES")));
+}
+
+TEST(FitMaterial, AsksForTheMoreOddsTheFartherApartTheLinesAre) {
+  size_t refused = 0, accepted = 0;
+  for (const size_t lines : {6U, 8U, 10U, 12U, 16U}) {
+    for (const double apart : {0.002, 0.005, 0.006, 0.007, 0.008}) {
+      const auto fit = FitMaterial({Body(lines, false, apart)}, {.density_kg_per_m3 = kDensity});
+      ++(fit.ok() ? accepted : refused);
+      if (fit.ok()) {
+        EXPECT_GE(fit->log_odds, 4 + 3500 * (fit->rms - 0.0035)) << lines << " lines, " << apart;
+      }
+    }
+  }
+  EXPECT_GT(refused, 0U);
+  EXPECT_GT(accepted, 5U);
 }
 
 TEST(CheckModes, TellsANoisyRecordingFromASoftBlow) {
