@@ -28,3 +28,5 @@ node_lock=$(sha256sum "$root/client_sdk/node/package-lock.json" | cut -c 1-16)
 export CARILLON_NODE_MODULES=$CARILLON_CACHE/node-$node_lock/node_modules
 engines_lock=$(sha256sum "$root/client_sdk/adapters/package-lock.json" | cut -c 1-16)
 export CARILLON_ENGINE_MODULES=$CARILLON_CACHE/engines-$engines_lock/node_modules
+console_lock=$(sha256sum "$root/client_sdk/console/ui/package-lock.json" | cut -c 1-16)
+export CARILLON_CONSOLE_MODULES=$CARILLON_CACHE/console-$console_lock/node_modules

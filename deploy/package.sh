@@ -23,7 +23,7 @@ folder=$(cd "${1:-$root/build/packages}" && pwd)
 
 if [[ -z $CARILLON_BUILD ]]; then
   "$root/deploy/setup.sh" programs packages
-  "$root/deploy/build.sh" release carillond carillon carillon-precompute carillon_client
+  "$root/deploy/build.sh" release carillond carillon carillon-console carillon-precompute carillon_client
   CARILLON_BUILD=$root/build/release
 fi
 export CARILLON_BUILD

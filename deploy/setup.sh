@@ -4,9 +4,10 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, engines, videos, tests, languages, packages, lint, fuzz, client) or a file. From
-# the npm registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node needs, and
-# `tests` and `engines` the engines that run in Node.
+# one of deploy/packages/ (programs, console, engines, videos, tests, languages, packages, lint, fuzz, client) or a
+# file. From the npm registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node
+# needs, `tests` and `engines` the engines that run in Node, and `tests`, `packages` and `console` what builds the
+# console's pages.
 # Calls neither registry when nothing is missing.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -17,11 +18,14 @@ lists=()
 with_buf=
 with_node=
 with_engines=
+with_console=
 for list in "$@"; do
   case $list in
     lint) with_buf=yes ;;
-    tests | engines) with_node=yes with_engines=yes ;;
-    packages) with_node=yes ;;
+    tests) with_node=yes with_engines=yes with_console=yes ;;
+    engines) with_node=yes with_engines=yes ;;
+    console) with_console=yes ;;
+    packages) with_node=yes with_console=yes ;;
   esac
   if [[ $list == */* ]]; then lists+=("$list"); else lists+=("$root/deploy/packages/$list.txt"); fi
 done
@@ -85,4 +89,7 @@ fi
 if [[ -n $with_engines && ! -e $CARILLON_ENGINE_MODULES/@babylonjs/havok ]]; then
   install_from_npm "$root/client_sdk/adapters" "${CARILLON_ENGINE_MODULES%/*}" \
     "$CARILLON_ENGINE_MODULES/@babylonjs/havok"
+fi
+if [[ -n $with_console && ! -e $CARILLON_CONSOLE_MODULES/three ]]; then
+  install_from_npm "$root/client_sdk/console/ui" "${CARILLON_CONSOLE_MODULES%/*}" "$CARILLON_CONSOLE_MODULES/three"
 fi

@@ -274,6 +274,7 @@ void AddCommands(CLI::App& app, Program& program) {
   AddScenes(app, program);
   AddStrike(app, program);
   AddListen(app, program);
+  AddConsole(app, program);
   AddRender(app, program);
   AddFoley(app, program);
   AddVolume(app, program);

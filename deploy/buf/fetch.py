@@ -71,7 +71,9 @@ def main():
     npm = settings()
     packages = json.loads(pathlib.Path(sys.argv[1]).read_text())["packages"]
     for path, package in packages.items():
-        if path and CPU.get(platform.machine()) in package.get("cpu", CPU.values()):
+        ours = (CPU.get(platform.machine()) in package.get("cpu", CPU.values())
+                and "linux" in package.get("os", ["linux"]))
+        if path and ours:
             asked = request(npm, path.rpartition("node_modules/")[2], package["version"])
             try:
                 archive = opener(npm).open(asked, timeout=300).read()

@@ -90,7 +90,7 @@ for document in carillon-precompute/{copyright,SOURCE} carillond/copyright caril
 done
 grep -q 'AFFERO' /usr/share/doc/carillon-precompute/copyright || fail "the AGPL is missing"
 
-packages=(carillond carillon-precompute carillon libcarillon-dev node-carillon python3-carillon)
+packages=(carillond carillon-precompute carillon carillon-console libcarillon-dev node-carillon python3-carillon)
 run_apt remove "${packages[@]}"
 [[ ! -e /usr/bin/carillond && ! -e /lib/systemd/system/carillond.service ]] || fail "remove left programs"
 [[ -e $settings && -e /var/lib/carillon/carillon.db ]] || fail "remove deleted settings or models"

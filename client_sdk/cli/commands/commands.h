@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "carillon/client.h"
 #include "client_sdk/cli/commands/example_bodies.h"
 #include "client_sdk/cli/commands/material_figures.h"
+#include "client_sdk/cli/commands/program.h"
 #include "client_sdk/cli/commands/stop_signal.h"
 #include "client_sdk/cli/output/message_json.h"
 #include "client_sdk/cli/output/rendered_file.h"
@@ -192,6 +194,17 @@ absl::Status CancelJob(const client::Client& daemon, const std::string& text, bo
 absl::Status Explain(const std::string& name, bool json);
 absl::Status ListMaterials(const client::Client& daemon, bool json);
 absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json);
+/// The options of `carillon console`.
+struct ConsoleOptions {
+  uint16_t port = 8700;  ///< of 127.0.0.1; zero takes any
+  bool browser = true;   ///< whether to open a browser where there is a desktop
+};
+
+/// Starts the daemon, if none listens at the program's Unix socket, and the console; prints the
+/// console's address, and opens it in a browser. Returns after a stop. Errors: Aborted
+/// (PROGRAM_ENDED).
+absl::Status RunConsole(const Program& program, const ConsoleOptions& options,
+                        const StopSignal& stop);
 /// Lists the scenes and their objects.
 absl::Status ListScenes(const client::Client& daemon, bool json);
 /// Deletes a scene, which `text` names as "scenes/7" or "7".

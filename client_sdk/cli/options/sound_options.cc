@@ -22,6 +22,22 @@ CLI::Option* AddSwitch(CLI::App& app, const std::string& name, const std::string
 
 }  // namespace
 
+void AddConsole(CLI::App& app, Program& program) {
+  auto options = std::make_shared<ConsoleOptions>();
+  CLI::App& console = *app.add_subcommand(
+      "console", "See, strike and hear bodies in a browser; starts the daemon if none runs");
+  console.add_option("--port", options->port, "The port of 127.0.0.1 to listen at; 0 takes any")
+      ->capture_default_str();
+  console.add_flag("--browser,!--no-browser", options->browser,
+                   "Open a browser where there is a desktop [yes]");
+  console.callback([&program, options] {
+    program.command = [&program, options] {
+      const StopSignal stop;
+      return RunConsole(program, *options, stop);
+    };
+  });
+}
+
 void AddVolume(CLI::App& app, Program& program) {
   auto options = std::make_shared<VolumeOptions>();
   CLI::App& volume =

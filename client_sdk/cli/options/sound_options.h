@@ -9,8 +9,9 @@ class App;
 
 namespace carillon::cli {
 
-/// These functions add `carillon volume`, `carillon stop` and `carillon scene
+/// These functions add `carillon console`, `carillon volume`, `carillon stop` and `carillon scene
 /// record`.
+void AddConsole(CLI::App& app, Program& program);
 void AddVolume(CLI::App& app, Program& program);
 void AddStop(CLI::App& app, Program& program);
 void AddSceneRecord(CLI::App& scene, Program& program);

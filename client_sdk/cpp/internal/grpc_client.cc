@@ -135,10 +135,16 @@ Rendering ReceiveSound(const AudioCallback& on_block, const BlowCallback& on_blo
 
 }  // namespace
 
-std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
-                                           const ConnectOptions& options) {
+std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server, const ConnectOptions& options,
+                                           bool alone) {
   grpc::ChannelArguments arguments;
-  if (IsOnThisMachine(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  if (alone) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  if (IsOnThisMachine(server)) {
+    arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+    // A daemon that was started again is found at once; looking for it costs nothing here.
+    arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 500);
+  }
   return grpc::CreateCustomChannel(server, CredentialsFor(options), arguments);
 }
 

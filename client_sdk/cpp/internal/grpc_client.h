@@ -27,9 +27,10 @@ inline constexpr auto kCallTimeout = std::chrono::seconds(60);
 inline constexpr auto kHealthTimeout = std::chrono::seconds(10);
 
 /// Opens the connection to a daemon. $http_proxy is for other machines: a proxy could not reach
-/// this one's loopback addresses.
-std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
-                                           const ConnectOptions& options);
+/// this one's loopback addresses. A channel that is `alone` shares its connection with no other
+/// channel of the process, so that what it holds at the daemon ends with it.
+std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server, const ConnectOptions& options,
+                                           bool alone = false);
 
 /// The client that talks to a daemon: one gRPC channel, and one stub for each service with streams.
 class GrpcClient final : public Client {

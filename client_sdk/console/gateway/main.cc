@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// carillon-console: serves the console's page to a browser of this machine, and carries the page's
+// calls to the daemon.
+#include <CLI/CLI.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client_sdk/console/gateway/http_connection.h"
+#include "proto/cpp/server_address.h"
+
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using carillon::console::Console;
+using carillon::console::HttpConnection;
+using carillon::console::Upstream;
+
+void Accept(tcp::acceptor& acceptor, const std::shared_ptr<Console>& console) {
+  acceptor.async_accept([&acceptor, console](boost::system::error_code error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (!error) std::make_shared<HttpConnection>(std::move(socket), console)->Run();
+    Accept(acceptor, console);
+  });
+}
+
+int Serve(const std::string& server, uint16_t port) {
+  asio::io_context context(1);
+  tcp::acceptor acceptor(context);
+  const tcp::endpoint wanted(asio::ip::address_v4::loopback(), port);
+  boost::system::error_code error;
+  acceptor.open(wanted.protocol());
+  acceptor.set_option(tcp::acceptor::reuse_address(true));
+  acceptor.bind(wanted, error);
+  if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
+  if (error) {
+    std::cerr << "carillon-console: port " << port << " of 127.0.0.1: " << error.message()
+              << "; name another with --port, or 0 for any\n";
+    return 1;
+  }
+  port = acceptor.local_endpoint().port();
+  const char* token = std::getenv("CARILLON_TOKEN");
+  const auto upstream = std::make_shared<Upstream>();
+  upstream->server = server;
+  upstream->token = token == nullptr ? "" : token;
+  const auto console = std::make_shared<Console>(
+      Console{.admission = carillon::console::Admission(port), .upstream = upstream});
+  Accept(acceptor, console);
+  asio::signal_set signals(context, SIGINT, SIGTERM);
+  signals.async_wait([&](boost::system::error_code, int) { context.stop(); });
+  std::cout << "http://127.0.0.1:" << port << "/?token=" << console->admission.token() << std::endl;
+  context.run();
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Serves the console, a page that shows and strikes models and hears the daemon, to browsers "
+      "of this machine.\n"
+      "From another machine: ssh -L 8700:127.0.0.1:8700 HOST.");
+  std::string server = carillon::DefaultServerAddress();
+  uint16_t port = 8700;
+  app.add_option("--server", server, "The address of the daemon")->capture_default_str();
+  app.add_option("--port", port, "The port of 127.0.0.1 to listen at; 0 takes any")
+      ->capture_default_str();
+  app.set_version_flag("--version", CARILLON_VERSION);
+  CLI11_PARSE(app, argc, argv);
+  return Serve(server, port);
+}

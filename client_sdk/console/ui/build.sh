@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# build.sh NODE_MODULES PROTO FOLDER: generates the contract's TypeScript, checks the types, and leaves the compressed
+# pages in FOLDER.
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+modules=$(cd "$1" && pwd)
+proto=$(cd "$2" && pwd)
+mkdir -p "$3"
+folder=$(cd "$3" && pwd)
+
+rm -rf "$folder/ui"
+mkdir -p "$folder/ui"
+cp -r "$here/src" "$here/index.html" "$here/style.css" "$here/tsconfig.json" "$folder/ui"
+ln -s "$modules" "$folder/ui/node_modules"
+cd "$folder/ui"
+rm -rf src/gen
+mkdir src/gen
+# The programs are called by node, because archives that were fetched without npm have no links to them.
+printf '#!/bin/sh\nexec node "%s/@bufbuild/protoc-gen-es/bin/protoc-gen-es"\n' "$modules" >protoc-gen-es
+chmod +x protoc-gen-es
+protoc -I "$proto" --plugin=protoc-gen-es=./protoc-gen-es --es_out=src/gen --es_opt=target=ts \
+  "$proto"/carillon/v1/*.proto
+node node_modules/typescript/bin/tsc
+bundler=$(echo node_modules/@esbuild/linux-*/bin/esbuild)
+bundle() {
+  "$bundler" "$@" --bundle --minify --format=esm --target=es2022 --outdir="$folder" \
+    --legal-comments=none --log-level=warning --jsx=automatic --jsx-import-source=preact
+}
+# What the page and its worker have in common is one file.
+bundle src/main.tsx src/listen_worker.ts --splitting --chunk-names=shared
+bundle src/player_worklet.ts
+for package in three three-mesh-bvh preact @preact/signals{,-core} @bufbuild/protobuf @connectrpc/connect; do
+  printf '%s\n\n' "$package"
+  cat "node_modules/$package"/LICENSE* 2>/dev/null ||
+    sed -n 's/^ *"license": *//p' "node_modules/$package/package.json"
+  printf '\n\n'
+done >"$folder/licences.txt"
+for page in index.html style.css; do cp "$page" "$folder"; done
+cd "$folder"
+for page in {index.html,style.css,{main,listen_worker,shared,player_worklet}.js,licences.txt}; do
+  gzip --best --no-name --force --keep "$page"
+done

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Listens to the daemon over a tunnel of its own, so that neither the page nor a large export delays the sound.
+import { AudioService } from './gen/carillon/v1/audio_service_pb';
+import { Ring } from './ring';
+import { clientOf } from './transport';
+import { Tunnel, tunnelAddress } from './tunnel';
+
+export type ListenNews =
+  | { kind: 'format'; sampleRateHz: number; channels: number; memory: SharedArrayBuffer }
+  | { kind: 'lost'; frames: number };
+
+const tell = (news: ListenNews) => self.postMessage(news);
+const RETRY_MS = 500;
+
+async function listen(tunnel: Tunnel, scene: string): Promise<void> {
+  let ring: Ring | undefined;
+  let nextFrame: bigint | undefined;
+  let lost = 0;
+  for await (const { format, block } of clientOf(AudioService, tunnel).listen({ scene })) {
+    if (format) {
+      ring = new Ring(Ring.allocate(format.channelCount), format.channelCount);
+      tell({ kind: 'format', sampleRateHz: format.sampleRateHz, channels: format.channelCount,
+        memory: ring.memory as SharedArrayBuffer });
+    }
+    if (!block || !ring) continue;
+    const bytes = block.samples;
+    const samples = new Float32Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength));
+    const missing = nextFrame === undefined ? 0 : Number(block.firstFrame - nextFrame);
+    if (missing > 0) {
+      // Silence of the same length keeps the clock.
+      ring.write(new Float32Array(Math.min(missing, 4096) * ring.channels));
+      tell({ kind: 'lost', frames: lost += missing });
+    }
+    ring.write(samples);
+    nextFrame = block.firstFrame + BigInt(samples.length / ring.channels);
+  }
+}
+
+self.onmessage = async (event: MessageEvent<{ scene: string }>) => {
+  const tunnel = new Tunnel(tunnelAddress(), () => {});
+  for (;;) {
+    await listen(tunnel, event.data.scene).catch(() => {});
+    await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+  }
+};

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+import { useEffect, useRef } from 'preact/hooks';
+import { effect } from '@preact/signals';
+import { LiveView, MOST_DOTS } from './live_view';
+import * as live from './live_state';
+import { hear, heardScene } from './sounding';
+import * as state from './state';
+import { SpectrogramView } from './strike_page';
+
+function Picture() {
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useEffect(() => {
+    const view = new LiveView(canvas.current!, state.services);
+    let newest: live.SeenBlow | undefined;
+    const ends = [
+      effect(() => { void view.update(live.scene.value, live.objects.value); }),
+      effect(() => {
+        const known = live.blows.value.indexOf(newest!);
+        for (const blow of live.blows.value.slice(0, Math.min(MOST_DOTS, known < 0 ? MOST_DOTS : known)).reverse()) view.blow(blow);
+        [newest] = live.blows.value;
+      }),
+    ];
+    return () => ends.forEach((end) => end());
+  }, []);
+  const poseless = live.objects.value.length > 0 && live.objects.value.every((object) => !object.pose);
+  return <><canvas ref={canvas} class="body scene" tabIndex={0} role="img" aria-label={`The bodies of ${live.sceneName.value}`} />
+    {poseless && <p class="hint">The simulator sends no poses, so the bodies stand in a row.</p>}</>;
+}
+
+function Chain() {
+  const links = live.chain.value;
+  const first = links.find((link) => link.state === 'broken');
+  return <section class="chain"><h2 id="chain">{first ? 'Why nothing is heard' : 'From the simulator to the ear'}</h2>
+    <ol aria-labelledby="chain">{links.map((link) => <li class={link === first ? 'broken' : link.state === 'broken' ? 'behind' : link.state}>
+      <strong>{link.name}</strong> <span>{link === first ? '✗ ' : link.state === 'well' ? '✓ ' : ''}{link.says}</span>
+      {link.remedy && <> <button onClick={link.remedy.act}>{link.remedy.text}</button></>}</li>)}</ol></section>;
+}
+
+function Findings() {
+  const warnings = [...live.streams.value.values()].flatMap((stream) => stream.report.warnings);
+  const findings = [...live.streams.value.values()].map((stream) => stream.report.findings);
+  const blowCount = findings.reduce((sum, one) => sum + Number(one?.blowCount ?? 0), 0);
+  const loadCount = findings.reduce((sum, one) => sum + Number(one?.loadCount ?? 0), 0);
+  return <section><h2>Findings</h2>
+    <p class="hint">{blowCount} blows and {loadCount} contacts at rest among those that the engine reported
+      {live.lostCount.value ? `; this page missed ${live.lostCount.value} messages` : ''}</p>
+    {warnings.map((warning) => <p class="warning"><strong>{warning.id}</strong> {warning.text}</p>)}
+  </section>;
+}
+
+const size = (impulse?: { x: number; y: number; z: number }) => Math.hypot(impulse?.x ?? 0, impulse?.y ?? 0, impulse?.z ?? 0);
+
+function Blows() {
+  return <section class="blows"><h2>Newest blows</h2><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
+    <tbody>{live.blows.value.slice(0, 12).map(({ blow }) => <tr>
+      <td>{blow.timeS.toFixed(3)}</td><td>{blow.object}</td>
+      <td>{blow.striker.case === 'otherObject' ? `body ${blow.striker.value}` : blow.striker.case === 'partner' ? `#${blow.striker.value}` : ''}</td>
+      <td>{size(blow.impulseNewtonSeconds).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
+}
+
+export function LivePage() {
+  useEffect(() => { live.watching.value = true; return () => { live.watching.value = false; }; }, []);
+  const heard = heardScene.value === live.sceneName.value;
+  return <main>
+    <div class="left">
+      <section class="creation"><label>Scene <select value={live.sceneName.value} onChange={(event) => { live.sceneName.value = event.currentTarget.value; }}>
+        {live.scenes.value.map((scene) => <option value={scene.name}>{scene.name}, {scene.objectCount} bodies, {live.decibels(scene.peak)}
+          {scene.name === state.sceneName() ? ' (this page)' : ''}</option>)}</select></label>
+        <label class="tick"><input type="checkbox" checked={heard} onChange={(event) => void hear(event.currentTarget.checked ? live.sceneName.value : '')} /> hear this scene alone</label>
+      </section>
+      <Picture /><SpectrogramView /></div>
+    <div class="right" tabIndex={0} role="region" aria-label="Why nothing is heard, findings and blows"><Chain /><Findings /><Blows />
+      {state.fault.value && <p class="fault" role="alert">{state.fault.value.message}</p>}</div></main>;
+}

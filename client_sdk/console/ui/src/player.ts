@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+import type { ListenNews } from './listen_worker';
+
+/** Plays the daemon's sound, or that of one scene, in the browser. */
+export class Player {
+  context?: AudioContext;
+  analyser?: AnalyserNode;
+  node?: AudioWorkletNode;
+  underruns = 0;
+  lostFrames = 0;
+  /** Gets what the audio thread plays, once it is told { tap: true }; for tests and for pages that record. */
+  onSamples: (samples: Float32Array, frame: number) => void = () => {};
+  private worker?: Worker;
+  private volume?: GainNode;
+  private gainDb = 24;
+  private playing = () => {};
+
+  constructor(private readonly changed: () => void = () => {}) {}
+
+  /**
+   * Plays the output, or a scene ("scenes/..."). Must be called by a gesture of the user, or the browser plays nothing.
+   * Resolves when sound arrives at the audio thread.
+   */
+  start(scene = ''): Promise<void> {
+    this.worker = new Worker('/listen_worker.js', { type: 'module' });
+    const { worker } = this;
+    const ready = new Promise<void>((resolve) => { this.playing = resolve; });
+    worker.onmessage = async ({ data }: MessageEvent<ListenNews>) => {
+      if (data.kind === 'lost') this.lostFrames = data.frames;
+      else await this.play(data);
+      this.changed();
+    };
+    worker.postMessage({ scene });
+    return ready;
+  }
+
+  async stop(): Promise<void> {
+    const { worker, context } = this;
+    this.context = this.analyser = this.node = this.worker = undefined;
+    worker?.terminate();
+    await context?.close();
+    this.changed();
+  }
+
+  /** The volume in this browser, dB. A limiter follows it. */
+  set volumeDb(db: number) {
+    this.gainDb = db;
+    this.volume?.gain.setTargetAtTime(10 ** (db / 20), this.context!.currentTime, 0.02);
+  }
+
+  get volumeDb(): number {
+    return this.gainDb;
+  }
+
+  private async play(format: Extract<ListenNews, { kind: 'format' }>): Promise<void> {
+    if (this.context?.sampleRate !== format.sampleRateHz) {
+      await this.context?.close();
+      this.context = new AudioContext({ sampleRate: format.sampleRateHz, latencyHint: 'interactive' });
+      const { context } = this;
+      await context.audioWorklet.addModule('/player_worklet.js');
+      if (this.context !== context) return;
+      this.connect(context, format.channels);
+    }
+    this.node!.port.postMessage({ memory: format.memory, channels: format.channels });
+    await this.context!.resume();
+  }
+
+  private connect(context: AudioContext, channels: number): void {
+    this.node = new AudioWorkletNode(context, 'carillon-player', { numberOfInputs: 0, outputChannelCount: [channels] });
+    this.node.port.onmessage = ({ data }) => {
+      if (data.playing) this.playing();
+      if (data.underruns) this.underruns = data.underruns;
+      if (data.samples) this.onSamples(data.samples, data.frame);
+      else this.changed();
+    };
+    this.analyser = new AnalyserNode(context, { fftSize: 4096, minDecibels: -130, maxDecibels: -40, smoothingTimeConstant: 0 });
+    this.volume = new GainNode(context, { gain: 10 ** (this.gainDb / 20) });
+    const limiter = new DynamicsCompressorNode(context, { threshold: -3, knee: 0, ratio: 20, attack: 0.001, release: 0.1 });
+    this.node.connect(this.analyser).connect(this.volume).connect(limiter).connect(context.destination);
+  }
+}

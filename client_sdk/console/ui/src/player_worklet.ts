@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays the ring. The daemon's clock and the sound card's differ by some 100 ppm, so the reader moves at a ratio near 1
+// that keeps the ring as full as its target, through a windowed sinc.
+import { Ring } from './ring';
+
+declare const sampleRate: number;
+declare const currentFrame: number;
+declare const registerProcessor: (name: string, processor: unknown) => void;
+declare class AudioWorkletProcessor { readonly port: MessagePort; }
+
+const TAPS = 32, PHASES = 512;
+const FIRST_TARGET = 768, LEAST_TARGET = 512, MORE = 256;
+const MOST_RATIO_CHANGE = 0.004, GAIN = 2e-6, SMOOTHING = 0.02;
+/** Frames beyond the target that are left out at once: the ratio would take minutes. */
+const MOST_EXCESS = 4096;
+
+/** PHASES + 1 rows of TAPS weights: a sinc under a Blackman window, each row of sum 1. */
+function sincTable(): Float32Array {
+  const table = new Float32Array((PHASES + 1) * TAPS);
+  for (let phase = 0; phase <= PHASES; phase += 1) {
+    let sum = 0;
+    for (let tap = 0; tap < TAPS; tap += 1) {
+      const x = tap - TAPS / 2 + 1 - phase / PHASES;
+      const u = (x + TAPS / 2) / TAPS;
+      const window = 0.42 - 0.5 * Math.cos(2 * Math.PI * u) + 0.08 * Math.cos(4 * Math.PI * u);
+      const weight = (Math.abs(x) < 1e-9 ? 1 : Math.sin(Math.PI * x) / (Math.PI * x)) * window;
+      table[phase * TAPS + tap] = weight;
+      sum += weight;
+    }
+    for (let tap = 0; tap < TAPS; tap += 1) table[phase * TAPS + tap]! /= sum;
+  }
+  return table;
+}
+
+class Player extends AudioWorkletProcessor {
+  private ring?: Ring;
+  private readonly table = sincTable();
+  private target = FIRST_TARGET;
+  private fraction = 0;
+  private smoothed = FIRST_TARGET;
+  private playing = false;
+  private adapt = true;
+  private tap = false;
+  private underruns = 0;
+  private leastSlack = Infinity;
+  private calm = 0;
+
+  constructor() {
+    super();
+    this.port.onmessage = (event) => {
+      const { memory, channels, adapt, tap } = event.data;
+      if (memory) {
+        this.ring = new Ring(memory, channels);
+        this.playing = false;
+      }
+      if (adapt !== undefined) {
+        this.adapt = adapt;
+        this.fraction = 0;
+      }
+      if (tap !== undefined) this.tap = tap;
+    };
+  }
+
+  process(_inputs: Float32Array[][], outputs: Float32Array[][]): boolean {
+    const output = outputs[0]!;
+    const frames = output[0]!.length;
+    const ring = this.ring;
+    if (!ring) return true;
+    let fill = ring.fill();
+    if (!this.playing) {
+      if (fill < this.target + TAPS) return true;
+      this.playing = true;
+      this.smoothed = fill;
+      this.port.postMessage({ playing: true });
+    }
+    if (fill > this.target + MOST_EXCESS) {
+      ring.release(fill - this.target);
+      fill = this.smoothed = this.target;
+    }
+    this.smoothed += SMOOTHING * (fill - this.smoothed);
+    const change = GAIN * (this.smoothed - this.target);
+    const ratio = this.adapt ? 1 + Math.max(-MOST_RATIO_CHANGE, Math.min(MOST_RATIO_CHANGE, change)) : 1;
+    if (fill < frames * ratio + TAPS + 1) return this.underrun(output);
+    this.read(ring, output, ratio);
+    this.relax(fill - frames - TAPS, frames);
+    if (this.tap) this.port.postMessage({ samples: output[0]!.slice(), frame: currentFrame });
+    return true;
+  }
+
+  private read(ring: Ring, output: Float32Array[], ratio: number): void {
+    const frames = output[0]!.length;
+    let place = this.fraction;
+    for (let i = 0; i < frames; i += 1) {
+      const whole = Math.floor(place);
+      const row = Math.round((place - whole) * PHASES) * TAPS;
+      for (let channel = 0; channel < output.length; channel += 1) {
+        let sum = 0;
+        const source = Math.min(channel, ring.channels - 1);
+        if (ratio === 1 && row === 0) sum = ring.at(whole + TAPS / 2 - 1, source);
+        else for (let tap = 0; tap < TAPS; tap += 1) sum += this.table[row + tap]! * ring.at(whole + tap, source);
+        output[channel]![i] = sum;
+      }
+      place += ratio;
+    }
+    const read = Math.floor(place);
+    ring.release(read);
+    this.fraction = place - read;
+  }
+
+  private underrun(output: Float32Array[]): boolean {
+    for (const channel of output) channel.fill(0);
+    this.playing = false;
+    this.target += MORE;
+    this.calm = 0;
+    this.port.postMessage({ underruns: this.underruns += 1 });
+    return true;
+  }
+
+  /** Lowers the target after three seconds whose least slack allows it. */
+  private relax(slack: number, frames: number): void {
+    this.leastSlack = Math.min(this.leastSlack, slack);
+    this.calm += frames;
+    if (this.calm < 3 * sampleRate) return;
+    if (this.leastSlack > MORE && this.target > LEAST_TARGET) this.target -= MORE / 2;
+    this.calm = 0;
+    this.leastSlack = Infinity;
+  }
+}
+
+registerProcessor('carillon-player', Player);

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+'use strict';
+
+const assert = require('node:assert/strict');
+const fs = require('node:fs');
+const http = require('node:http');
+const path = require('node:path');
+const test = require('node:test');
+const WebSocket = require('ws');
+const { chromium } = require('playwright-core');
+
+const address = new URL(process.env.CARILLON_CONSOLE);
+const origin = `http://${address.host}`;
+const pictures = process.env.CARILLON_TEST_PICTURES;
+
+function get(target, headers = {}) {
+  return new Promise((resolve, reject) => {
+    http.get({ host: address.hostname, port: address.port, path: target, headers }, (response) => {
+      response.resume();
+      response.on('end', () => resolve(response));
+    }).on('error', reject);
+  });
+}
+
+async function cookie() {
+  const response = await get(address.pathname + address.search);
+  assert.equal(response.statusCode, 303);
+  const [set] = response.headers['set-cookie'];
+  assert.match(set, /HttpOnly; SameSite=Strict/);
+  return set.split(';')[0];
+}
+
+/** 'open', or the status with which a WebSocket was refused. */
+function upgrade(headers) {
+  return new Promise((resolve) => {
+    const socket = new WebSocket(`ws://${address.host}/tunnel`, { headers });
+    socket.on('open', () => { socket.close(); resolve('open'); });
+    socket.on('unexpected-response', (_request, response) => { response.destroy(); resolve(response.statusCode); });
+    socket.on('error', () => {});
+  });
+}
+
+function frame(kind, call, body = '') {
+  const bytes = Buffer.alloc(5 + body.length);
+  bytes[0] = kind;
+  bytes.writeUInt32LE(call, 1);
+  bytes.write(body, 5);
+  return bytes;
+}
+
+test('only a browser that has shown the token gets the page, and only from this machine by name', async () => {
+  assert.equal((await get('/')).statusCode, 401);
+  assert.equal((await get('/?token=wrong')).statusCode, 401);
+  const mine = await cookie();
+  const page = await get('/', { cookie: mine });
+  assert.equal(page.statusCode, 200);
+  assert.match(page.headers['content-security-policy'], /default-src 'none'/);
+  assert.equal(page.headers['cross-origin-embedder-policy'], 'require-corp');
+  assert.equal((await get('/', { cookie: mine, host: 'evil.example' })).statusCode, 421);
+  assert.equal((await get('/', { cookie: mine, host: '127.0.0.1.evil.example' })).statusCode, 421);
+  assert.equal((await get('/../../etc/passwd', { cookie: mine })).statusCode, 404);
+});
+
+test('a tunnel needs the cookie and the own origin', async () => {
+  const mine = await cookie();
+  assert.equal(await upgrade({ cookie: mine, origin }), 'open');
+  assert.equal(await upgrade({ origin }), 403);
+  assert.equal(await upgrade({ cookie: mine }), 403);
+  assert.equal(await upgrade({ cookie: mine, origin: 'http://evil.example' }), 403);
+  assert.equal(await upgrade({ cookie: mine, origin: `http://localhost:${address.port}` }), 403);
+});
+
+test('of 200 strangers none is let in', async () => {
+  const mine = await cookie();
+  const [name, value] = mine.split('=');
+  const wrong = () => require('node:crypto').randomBytes(32).toString('hex');
+  const strangers = [
+    () => upgrade({ cookie: mine, origin: `http://${wrong()}.example` }),
+    () => upgrade({ cookie: mine, origin: 'null' }),
+    () => upgrade({ cookie: mine, origin: origin.replace('http', 'https') }),
+    () => upgrade({ cookie: `${name}=${wrong()}`, origin }),
+    () => upgrade({ cookie: `${name}=${value}0`, origin }),
+    () => upgrade({ cookie: mine, origin: `http://${wrong()}.example`, host: `${wrong()}.example` }),
+    async () => (await get(`/?token=${wrong()}`)).statusCode,
+    async () => (await get('/main.js', { cookie: `other-${name}=${value}` })).statusCode,
+    async () => (await get('/', { cookie: mine, host: `127.0.0.1.${wrong()}.example:80` })).statusCode,
+    async () => (await get(address.pathname + address.search, { host: `${wrong()}.example` })).statusCode,
+  ];
+  for (let i = 0; i < 200; i += 1) {
+    const answer = await strangers[i % strangers.length]();
+    assert.ok([401, 403, 421].includes(answer), `stranger ${i % strangers.length} got ${answer}`);
+  }
+});
+
+const residentBytes = () => Number(/VmRSS:\s+(\d+)/.exec(fs.readFileSync(`/proc/${process.env.CARILLON_CONSOLE_PID}/status`, 'utf8'))[1]) * 1024;
+
+test('a flood of calls and a reader that never reads take bounded memory', { timeout: 120000 }, async () => {
+  const headers = { cookie: await cookie(), origin };
+  const greedy = new WebSocket(`ws://${address.host}/tunnel`, { headers });
+  await new Promise((resolve) => { greedy.on('open', resolve); });
+  const codes = [];
+  greedy.on('message', (bytes) => { if (bytes[0] === 4) codes.push(bytes.readUInt32LE(5)); });
+  for (let call = 0; call < 500; call += 1) greedy.send(frame(0, call, '/carillon.v1.ContactService/StreamContacts'));
+  while (codes.length < 436) await new Promise((resolve) => { setTimeout(resolve, 10); });
+  assert.deepEqual([...new Set(codes)], [8]);  // RESOURCE_EXHAUSTED, for all but 64
+  greedy.terminate();
+
+  // The output in small blocks is 190 kB a second. One that does not read it loses them at the daemon.
+  const slow = new WebSocket(`ws://${address.host}/tunnel`, { headers });
+  await new Promise((resolve) => { slow.on('open', resolve); });
+  slow.pause();
+  const before = residentBytes();
+  for (let call = 0; call < 30; call += 1) {
+    slow.send(frame(0, call, '/carillon.v1.AudioService/Listen'));
+    slow.send(frame(1, call));
+    slow.send(frame(2, call));
+  }
+  await new Promise((resolve) => { setTimeout(resolve, 4000); });  // 23 MB of sound
+  assert.ok(residentBytes() - before < 12 << 20, `${residentBytes() - before} bytes more`);
+  slow.terminate();
+
+  // A connection that ends amid a frame ends alone.
+  const raw = require('node:net').connect(address.port, address.hostname);
+  raw.write(`GET /tunnel HTTP/1.1\r\nHost: ${address.host}\r\nOrigin: ${origin}\r\nCookie: ${headers.cookie}\r\nUpgrade: websocket\r\n`
+    + 'Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n');
+  await new Promise((resolve) => { raw.once('data', resolve); });
+  raw.end(Buffer.from([0x82, 0xfe, 0xff]));
+  await new Promise((resolve) => { raw.once('close', resolve); });
+  assert.equal((await get('/', headers)).statusCode, 200);
+});
+
+test('a tunnel serves no administration, and ends at a frame that is none', async () => {
+  const socket = new WebSocket(`ws://${address.host}/tunnel`, { headers: { cookie: await cookie(), origin } });
+  await new Promise((resolve) => { socket.on('open', resolve); });
+  const ends = [];
+  socket.on('message', (bytes) => ends.push([bytes[0], bytes.readUInt32LE(1), bytes.readUInt32LE(5)]));
+  socket.send(frame(0, 7, '/carillon.v1.AdminService/GetDatabaseStats'));
+  socket.send(frame(0, 8, '/carillon.worker.v1.JobRunService/FetchMesh'));
+  socket.send(frame(0, 9, '/carillon.v1.ServerService/GetServerInfo'));
+  socket.send(frame(1, 9));
+  socket.send(frame(2, 9));
+  while (ends.filter(([kind]) => kind === 4).length < 3) await new Promise((resolve) => { setTimeout(resolve, 10); });
+  const codes = Object.fromEntries(ends.filter(([kind]) => kind === 4).map(([, call, code]) => [call, code]));
+  assert.deepEqual(codes, { 7: 7, 8: 7, 9: 0 });
+  const closed = new Promise((resolve) => { socket.on('close', resolve); });
+  socket.send(Buffer.from([4, 1, 0, 0, 0]));
+  assert.equal(await closed, 1002);
+});
+
+/** The variance of the brightness of a part of a screenshot, which is 0 if nothing is drawn there. */
+async function variance(page, selector, file) {
+  const picture = await page.locator(selector).screenshot({ path: path.join(pictures, file) });
+  return page.evaluate(async (base64) => {
+    const image = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))]));
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const pen = canvas.getContext('2d');
+    pen.drawImage(image, 0, 0);
+    const { data } = pen.getImageData(0, 0, image.width, image.height);
+    let sum = 0, squares = 0;
+    for (let i = 0; i < data.length; i += 4) { sum += data[i]; squares += data[i] ** 2; }
+    const count = data.length / 4;
+    return squares / count - (sum / count) ** 2;
+  }, picture.toString('base64'));
+}
+
+/** Runs `work` with the console in Chromium, which must report no error. */
+async function inBrowser(work) {
+  const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: process.getuid() === 0 ? ['--no-sandbox'] : [] });
+  try {
+    const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
+    page.setDefaultTimeout(120000);
+    const faults = [];
+    page.on('pageerror', (error) => faults.push(error.message));
+    page.on('console', (message) => { if (message.type() === 'error') faults.push(message.text()); });
+    await page.goto(address.href);
+    await work(page);
+    assert.deepEqual(faults, []);
+  } finally {
+    await browser.close();
+  }
+}
+
+/** axe-core's findings about the page as it is. */
+async function accessibilityFaults(page) {
+  await page.evaluate(fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
+  return page.evaluate(async () => (await globalThis.axe.run()).violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`));
+}
+
+async function keepPicture(page, name) {
+  await page.screenshot({ path: path.join(pictures, name) });
+  if (process.env.CARILLON_KEEP_PICTURES) fs.copyFileSync(path.join(pictures, name), path.join(process.env.CARILLON_KEEP_PICTURES, name));
+}
+
+const isModelReady = () => carillonConsole.state.model.value && !carillonConsole.state.upload.value && !carillonConsole.state.busy.value;
+
+test('in Chromium a mesh becomes a model that is seen, struck and heard', { timeout: 400000 }, () => inBrowser(async (page) => {
+  assert.equal(await page.evaluate(() => crossOriginIsolated), true);
+  await page.locator('input[type=file]').setInputFiles(process.env.CARILLON_TEST_BAR);
+  await page.waitForFunction(isModelReady);
+  assert.equal(await page.locator('.fault').count(), 0);
+  // The slender bar of the tests bends first at the frequency of beam theory, in steel.
+  const modes = await page.evaluate(() => carillonConsole.state.modes.value.map((mode) => mode.frequencyHz));
+  assert.ok(Math.abs(modes[0] / Number(process.env.CARILLON_TEST_BAR_HZ) - 1) < 0.02, `${modes[0]} Hz`);
+  assert.ok(await variance(page, '.body', 'body.png') > 100);
+
+  // A click at the middle of the picture strikes the bar there, and is heard here at the bar's frequencies.
+  const box = await page.locator('.body').boundingBox();
+  const click = () => page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await click();
+  await page.waitForFunction(() => carillonConsole.state.row.value && carillonConsole.player.node);
+  await page.evaluate(() => {
+    carillonConsole.view().paused = true;
+    globalThis.played = [];
+    carillonConsole.player.onSamples = (samples) => { played.push(...samples); };
+    carillonConsole.player.node.port.postMessage({ tap: true, adapt: false });
+    globalThis.sent = [];
+    globalThis.lostFrames = 0;
+    void (async () => {
+      for await (const { block, lostFrameCount } of carillonConsole.state.services.audio.listen({})) {
+        if (block) sent.push(...new Float32Array(block.samples.slice().buffer));
+        lostFrames = Number(lostFrameCount);
+      }
+    })();
+  });
+  await page.waitForFunction(() => sent.length > 0 && played.length > 0);
+  await click();
+  const found = await page.waitForFunction(() => {
+    const begin = played.findIndex((sample) => Math.abs(sample) > 1e-6);
+    return begin >= 0 && played.length - begin > 16384 && sent.length > 96000 && { begin };
+  });
+  assert.ok((await found.jsonValue()).begin >= 0);
+  // With the rate loop off, what the audio thread plays are the daemon's samples, bit for bit, but for the silence of gaps.
+  const { equal, other, lost } = await page.evaluate(() => {
+    const quantum = 128;
+    let equal = 0, other = 0, place = 0;
+    for (let i = 0; i + quantum <= played.length; i += quantum) {
+      const block = played.slice(i, i + quantum);
+      if (block.every((sample) => sample === 0)) continue;
+      let at = place;
+      while (at + quantum <= sent.length && !block.every((sample, k) => sample === sent[at + k])) at += 1;
+      // What was played before the other listener began is not among its blocks.
+      if (at + quantum > sent.length) other += equal ? 1 : 0;
+      else { equal += 1; place = at + quantum; }
+    }
+    // A starved page loses whole blocks of the daemon, which the other listener may have; two parts of each are mixed.
+    return { equal, other, lost: (lostFrames + carillonConsole.player.lostFrames) / quantum };
+  });
+  assert.ok(equal >= 50, `${equal} blocks of 128 frames are equal`);
+  assert.ok(other <= 2 * lost, `${other} blocks differ, ${lost} were lost`);
+
+  assert.ok(await variance(page, '.spectrum', 'spectrum.png') > 100);
+  await page.evaluate(() => { carillonConsole.view().paused = false; });
+  await page.getByRole('listbox').press('ArrowDown');
+  assert.equal(await page.locator('.modes [aria-selected=true]').count(), 1);
+  // The first mode has two nodal lines: the ends and the middle move, and a mode shape changes the picture.
+  await page.waitForFunction(() => carillonConsole.state.model.value.shapes.get(0));
+  await keepPicture(page, 'console_strike.png');
+
+  // Half the size is twice the frequency; the page and the daemon agree.
+  const half = page.getByLabel(/^Size/);
+  await half.fill('-0.3');
+  await half.dispatchEvent('change');
+  const factor = 10 ** 0.3;
+  await page.waitForFunction(async ([lowest, ratio]) => {
+    const { objects } = await carillonConsole.state.services.scenes.listObjects({ scene: carillonConsole.state.sceneName() });
+    return Math.abs(objects[0].lowestFrequencyHz / lowest / ratio - 1) < 1e-3;
+  }, [modes[0], factor]);
+  assert.ok(Math.abs(await page.evaluate(() => carillonConsole.state.modes.value[0].frequencyHz) / modes[0] / factor - 1) < 1e-3);
+
+  // The keyboard alone strikes another point.
+  const before = await page.evaluate(() => carillonConsole.state.strike.value.point);
+  await page.locator('.body').focus();
+  for (let i = 0; i < 3; i += 1) await page.keyboard.press('Shift+ArrowRight');
+  await page.keyboard.press('Space');
+  await page.waitForFunction((was) => carillonConsole.state.strike.value.point[0] !== was[0], before);
+
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Save WAV').click()]);
+  const wave = fs.readFileSync(await download.path());
+  assert.equal(wave.toString('latin1', 0, 4), 'RIFF');
+  assert.ok(new Float32Array(new Uint8Array(wave.subarray(44)).buffer).some((sample) => Math.abs(sample) > 1e-5));
+  assert.deepEqual(await accessibilityFaults(page), []);
+}));
+
+test('a refused mesh is shown with the place that is wrong, and repaired by a button', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.locator('input[type=file]').setInputFiles(process.env.CARILLON_TEST_OPEN);
+  await page.getByText('MESH_NOT_CLOSED').or(page.getByText('open edges')).waitFor();
+  assert.ok(await variance(page, '.body', 'refused.png') > 100);
+  await page.getByRole('button', { name: 'Repair it' }).click();
+  await page.waitForFunction(isModelReady);
+}));
+
+test('a running simulator is seen, and why it is silent', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.getByRole('link', { name: 'Live' }).click();
+  await page.locator('.chain .broken').getByText('The scene is muted.').waitFor();
+  await page.waitForFunction(() => carillonConsole.live.blows.value.length >= 3);
+  const { handle, impulse } = await page.evaluate(() => {
+    const { blow } = carillonConsole.live.blows.value[0];
+    return { handle: blow.object, impulse: blow.impulseNewtonSeconds.z };
+  });
+  assert.ok([1, 2, 3].includes(handle));
+  assert.ok(Math.abs(impulse - 0.02) < 1e-6, `${impulse}`);
+  const poses = await page.evaluate(() => carillonConsole.live.objects.value.map((object) => object.pose.positionM.x));
+  assert.deepEqual(poses, [0, 0.5, 1]);
+  // A picture of software takes its time: it is taken while nothing moves.
+  await page.evaluate(() => { carillonConsole.live.watching.value = false; });
+  assert.ok(await variance(page, '.scene', 'scene.png') > 5);  // three slender bars
+  await page.evaluate(() => { carillonConsole.live.watching.value = true; });
+  await page.getByRole('button', { name: 'Unmute' }).press('Enter');
+  await page.waitForFunction(() => carillonConsole.live.scene.value.muted === false);
+  await page.waitForFunction(() => !document.querySelector('.chain .broken'));
+  await page.evaluate(() => { carillonConsole.live.watching.value = false; });
+  await keepPicture(page, 'console_live.png');
+  assert.deepEqual(await accessibilityFaults(page), []);
+}));
+
+test('the models are listed with their pictures, and the space bar lets one be heard', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.getByRole('link', { name: 'Models' }).click();
+  await page.locator('.models img').first().waitFor();
+  await page.getByLabel('Label').fill('bar');
+  await page.locator('.models').focus();
+  await page.keyboard.press('Space');
+  await page.waitForFunction(() => carillonConsole.state.row.value && carillonConsole.state.mixer.value.activeModeCount > 0);
+  await keepPicture(page, 'console_models.png');
+  assert.deepEqual(await accessibilityFaults(page), []);
+}));
+
+test('after the daemon was killed and started again, the page strikes as before', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.waitForFunction(() => carillonConsole.state.model.value && !carillonConsole.state.busy.value);
+  const scene = await page.evaluate(() => carillonConsole.state.sceneName());
+  process.kill(Number(process.env.CARILLON_DAEMON_PID), 'SIGKILL');
+  await page.waitForFunction((old) => carillonConsole.state.sceneName() !== old && !carillonConsole.state.busy.value, scene);
+  const box = await page.locator('.body').boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForFunction(async () => (await carillonConsole.state.services.audio.getMixer({})).activeModeCount > 0);
+  assert.equal(await page.locator('.fault').count(), 0);
+}));
