@@ -3,9 +3,11 @@
 
 import json
 import pathlib
+import re
 import time
 import unittest
 
+from carillon.v1 import modal_model_service_pb2
 from daemon import DaemonTest
 
 # With a thread that renders each block the daemon woke 1,430 times a second.
@@ -41,6 +43,20 @@ class IdleTest(DaemonTest):
         last, end = self.frame(), time.monotonic()
         # A pause renders ten times a second.
         self.assertAlmostEqual((last - first) / RATE_HZ, end - begin, delta=0.5)
+
+    def resident_mib(self):
+        status = pathlib.Path(f"/proc/{self.daemon.process.pid}/status").read_text()
+        return int(re.search(r"VmRSS:\s+(\d+)", status)[1]) / 1024
+
+    def test_the_memory_of_large_messages_is_given_back(self):
+        before = self.resident_mib()
+        piece = modal_model_service_pb2.UploadMeshRequest(data=bytes(2**20))
+        self.client.models.UploadMesh(iter([piece] * 64))
+        deadline = time.monotonic() + 30
+        while self.resident_mib() > before + 16 and time.monotonic() < deadline:
+            time.sleep(0.5)
+        print(f"{before:.0f} MiB before 64 MiB came, {self.resident_mib():.0f} MiB after them", flush=True)
+        self.assertLess(self.resident_mib(), before + 16)
 
 
 if __name__ == "__main__":

@@ -85,41 +85,8 @@ TEST_F(EventApi, AnUploadNamesTheMeshAndTheCaller) {
   EXPECT_THAT(events(), ElementsAre(absl::StrCat("mesh_stored mesh=", mesh, " bytes=5", by_)));
 }
 
-TEST_F(EventApi, AnImportAndADeletionNameTheModelAndTheCaller) {
-  const std::string model = ImportSmallModel();
-  v1::DeleteModalModelRequest request;
-  request.set_name(model);
-  v1::DeleteModalModelResponse response;
-  ASSERT_TRUE(
-      Call(*models, &v1::ModalModelService::Stub::DeleteModalModel, request, response).ok());
-  EXPECT_FALSE(
-      Call(*models, &v1::ModalModelService::Stub::DeleteModalModel, request, response).ok());
-  EXPECT_THAT(events(),
-              ElementsAre(AllOf(StartsWith("model_imported model=" + model + " label=small modes="),
-                                HasSubstr(" bytes="), testing::EndsWith(by_)),
-                          "model_deleted model=" + model + by_));
-}
-
-TEST_F(EventApi, AChangeOfAModelTellsWhatWasWanted) {
-  v1::UpdateModalModelRequest request;
-  request.set_name(ImportSmallModel());
-  request.set_label("two words\nand a line");
-  request.set_pinned(true);
-  request.add_add_tags("a");
-  request.add_add_tags("b");
-  v1::UpdateModalModelResponse response;
-  ASSERT_TRUE(
-      Call(*models, &v1::ModalModelService::Stub::UpdateModalModel, request, response).ok());
-  EXPECT_EQ(events().back(),
-            absl::StrCat("model_updated model=", request.name(),
-                         R"( label="two words\nand a line" pinned=true add_tags=a,b)", by_));
-}
-
-TEST_F(EventApi, ACollectionNamesEachModelAndADryRunNone) {
-  const std::string model = ImportSmallModel();
-  v1::CollectGarbageRequest request;
-  request.set_delete_unpinned(true);
-  request.set_dry_run(true);
+TEST_F(EventApi, ACollectionWithoutABudgetIsRefusedAndDeletesNothing) {
+  grpc::ClientContext context;
   v1::CollectGarbageResponse response;
   ASSERT_TRUE(Call(*admin, &v1::AdminService::Stub::CollectGarbage, request, response).ok());
   EXPECT_THAT(events(), Not(Contains(StartsWith("model_deleted"))));

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "precompute/mesh/fill/fill_with_tetgen.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
 #include "tests/precompute/test_meshes.h"
@@ -170,6 +171,19 @@ TEST(Tetrahedralize, RefusesAMeshOverTheLimit) {
                   .status()
                   .ToString(),
               HasSubstr("MESH_TOO_LARGE"));
+}
+
+TEST(FillWithTetgen, IsStoppedWhereItRefinesLongerThanItMay) {
+  const RefinedSurface box = RefineSurface(MakeBoxSurface({1, 1, 1}), 1);
+  const SizeField uniform;
+  const auto mesh = FillWithTetgen({.surface = box,
+                                    .cavities = {},
+                                    .max_volume = 1e-8,  // 10^8 tetrahedra take an hour
+                                    .relative_size = uniform,
+                                    .keep_surface = false,
+                                    .max_added_nodes = 100'000'000,
+                                    .most_cpu = std::chrono::seconds(1)});
+  EXPECT_THAT(mesh.status().ToString(), HasSubstr("stopped after 1 s"));
 }
 
 constexpr std::chrono::seconds kMostCpu(10);
