@@ -104,27 +104,6 @@ class BarTest(StruckBody):
         self.assertLess(abs(partial.decay_per_s / sigmas[0] - 1), 0.02)
         return partial
 
-    def assert_changes(self, changed, frequency, amplitude):
-        """The first mode against the plain one; 1 % of level is 0.09 dB."""
-        plain = self.first_mode()
-        self.assertAlmostEqual(changed.frequency_hz / plain.frequency_hz, frequency, delta=0.001)
-        self.assertAlmostEqual(changed.amplitude / plain.amplitude, amplitude, delta=0.01 * amplitude)
-
-    # With c' = c e^(1/2) r^-1 s^(-1/2), phi' = phi r^(-1/2) s^(-3/2) and omega' = omega
-    # (e/r)^(1/2)/s, the amplitude c phi J/omega goes with 1/(r s) and not with stiffness.
-
-    def test_four_times_the_stiffness_is_an_octave_higher_and_as_loud(self):
-        self.assert_changes(self.first_mode(young_pa=4 * meshes.YOUNG_PA), 2, 1)
-
-    def test_four_times_the_density_is_an_octave_lower_and_a_quarter_as_loud(self):
-        self.assert_changes(self.first_mode(density_kg_per_m3=4 * meshes.DENSITY), 0.5, 0.25)
-
-    def test_twice_the_size_is_an_octave_lower_and_half_as_loud(self):
-        self.assert_changes(self.first_mode(size=2.0), 0.5, 0.5)
-
-    def test_more_damping_decays_faster_from_the_same_level(self):
-        self.assert_changes(self.first_mode(alpha1_s=4e-7, alpha2_per_s=30.0), 1, 1)
-
     def test_no_change_of_material_or_size_decomposes_again(self):
         self.first_mode(young_pa=2e11, density_kg_per_m3=7800.0, size=0.5)
         jobs = self.client.jobs.ListJobs(decomposition_service_pb2.ListJobsRequest()).jobs
@@ -139,9 +118,6 @@ class BarTest(StruckBody):
         again = self.client.models.GetModalModel(
             modal_model_service_pb2.GetModalModelRequest(name=self.model)).modal_model
         self.assertEqual(again.created_unix_ms, created.created_unix_ms)
-
-    def test_rendering_twice_gives_the_same_bits(self):
-        numpy.testing.assert_array_equal(self.struck(), self.struck())
 
     def test_live_sounds_as_offline(self):
         steps = [contact_pb2.ContactStep(time_s=time, contacts=[sound.impulse(self.POINT, force)])

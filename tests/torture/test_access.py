@@ -187,32 +187,6 @@ class AccessTest(unittest.TestCase):
                 self.assertEqual(self.outcome(channel, listen, token_of(name), request)[1], reason, name)
             self.assertEqual(self.outcome(channel, listen, token_of("guest"))[0], grpc.StatusCode.OK)
 
-    def test_certificates_of_others_and_expired_ones_are_refused_and_logged(self):
-        self.serve()
-        self.attempts = 0
-        listen = "/carillon.v1.AudioService/Listen"
-        stranger = Authority(self.folder, "stranger").issue("console", alternative="DNS:console.example.org")
-        expired = self.authority.issue("expired", alternative="DNS:console.example.org", end="20210101000000Z")
-        unknown = self.authority.issue("nobody")
-        good = self.authority.issue("console", alternative="DNS:console.example.org")
-
-        def listen_with(files):
-            with self.channel(*files) as channel:
-                return self.outcome(channel, listen)
-        self.attack("wrong authority", TIMES, lambda: listen_with(stranger))
-        self.attack("expired", TIMES, lambda: listen_with(expired))
-        handshakes = self.attempts
-        self.attack("a name that the file does not have", TIMES, lambda: listen_with(unknown))
-        self.assertEqual(listen_with(good)[0], grpc.StatusCode.OK)
-        for kind in ("email:console.example.org", "URI:console.example.org", "DNS:other,email:console.example.org"):
-            other_kind = self.authority.issue("console.example.org", alternative=kind)
-            self.assertEqual(listen_with(other_kind)[1], "CREDENTIAL_MISSING", kind)
-        common = self.authority.issue("common", alternative=None)
-        self.assertEqual(listen_with(common)[0], grpc.StatusCode.OK)
-        self.daemon.stop()
-        lines = self.logged("(gRPC: .*[Hh]andshake|a call of /[^ ]+ from ipv4:127.0.0.1:[0-9]+ was refused)")
-        self.assertGreaterEqual(lines, handshakes + TIMES)
-
     def test_guessing_is_slowed_and_those_who_were_let_in_before_do_not_notice(self):
         self.serve()
         method = "/carillon.v1.AudioService/GetMixer"

@@ -16,7 +16,7 @@ import numpy
 
 import carillon
 from carillon.v1 import (
-    audio_service_pb2, contact_service_pb2, decomposition_pb2, error_pb2, modal_model_service_pb2,
+    audio_service_pb2, contact_service_pb2, decomposition_pb2, error_pb2,
     scene_service_pb2, warning_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
@@ -67,39 +67,6 @@ class WarningsTest(unittest.TestCase):
 
 
 class RefusalsTest(MessagesTest):
-    def test_a_misspelt_argument_is_refused_with_the_nearest_name(self):
-        for function, arguments, wrong, right in (
-                (self.c.create_model, (MESH, "oak"), "max_frequency", "max_frequency_hz"),
-                (self.c.render, (carillon.Trace(),), "tail", "tail_s"),
-                (carillon.striker, ("wood",), "mass", "mass_kg"),
-                (carillon.material, ("oak",), "young", "young_pa"),
-                (carillon.connect, (), "tls_root", "tls_roots")):
-            self.refused(f'has no "{wrong}"; did you mean "{right}"?', function, *arguments, **{wrong: 1})
-        self.refused('models has no "colour"; it has created_before_unix_ms', next, self.c.models(colour="x"))
-        self.refused('settings has no "meters_per_unit"; did you mean "metres_per_unit"?', self.c.create_model, MESH,
-                     "oak", settings={"meters_per_unit": 1})
-        scene = carillon.Scene(self.c, "scenes/1")
-        self.refused('object 1 of add_all has no "gian"; did you mean "gain"?', scene.add_all,
-                     ["modalModels/1", {"model": "modalModels/1", "gian": 1}])
-
-    def test_an_object_of_another_scene_is_refused(self):
-        one, two = (carillon.SoundingObject(carillon.Scene(self.c, f"scenes/{i}"),
-                                            scene_service_pb2.SoundingObject(handle=1)) for i in (1, 2))
-        point, impulse = [[0, 0, 0]], [[0, 0, 1]]
-        check = carillon.streams._refuse_other_scenes
-        check(carillon.Impacts([one], point, impulse, second_objects=[3]), "scenes/1")
-        for columns in (carillon.Impacts(two, point, impulse), carillon.Impacts([1], point, impulse,
-                                                                                  second_objects=[two])):
-            self.refused("an object of scenes/2, and this is a stream of scenes/1", check, columns, "scenes/1")
-
-    def test_a_setting_at_the_wrong_level_is_refused_with_the_right_one(self):
-        for wrong, right in (("poisson_ratio", "settings=dict(poisson_ratio=...)"),
-                             ("budget_s", "settings=dict(mesh=dict(budget_s=...)) or transfer=dict(budget_s=...)"),
-                             ("young_pa", "material=carillon.material(young_pa=...)")):
-            self.refused(f'create_model has no "{wrong}"; give it as {right}', self.c.create_model, MESH, "oak",
-                         **{wrong: 1})
-        self.refused('create_model has no "accuracys"; did you mean "accuracy"?', self.c.create_model, MESH, "oak",
-                     accuracys=0.1)
 
     def test_the_unit_and_the_accuracy_become_settings(self):
         made = carillon.settings.to_settings({"poisson_ratio": 0.3}, "mm", 0.01)
@@ -112,16 +79,6 @@ class RefusalsTest(MessagesTest):
                                 ("unit and settings.metres_per_unit are both given; leave one of them out",
                                  {"unit": "mm", "settings": {"metres_per_unit": 1}})):
             self.refused(expected, self.c.create_model, MESH, "oak", **wrong)
-
-    def test_a_wrong_word_is_refused_with_the_right_ones(self):
-        for wrong, expected in (({"frame": "world"}, 'frame is \'world\'; it must be one of "object", "scene"'),
-                                ({"pulse_shape": "gauss"}, 'it must be one of "raised_cosine", "gaussian"')):
-            self.refused(expected, carillon.Trace, **wrong)
-        self.refused('"modes_only"', carillon.Trace().add, "modalModels/1", radiation="none")
-        self.refused('"failed"', next, self.c.jobs(["broken"]))
-
-    def test_an_effect_of_hearing_is_refused_with_the_place_where_it_belongs(self):
-        self.refused('scene has no "panning"; give it as hearing=dict(panning=True)', self.c.scene, panning=True)
 
     def test_a_value_of_the_wrong_type_is_refused_by_the_name_of_its_argument(self):
         self.refused("tail_s of render is 'long'; it must be a number", self.c.render, carillon.Trace(), tail_s="long")
@@ -161,20 +118,6 @@ class RefusalsTest(MessagesTest):
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
         self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
 
-    def test_handles_and_partners_that_are_no_whole_numbers_of_32_bits_are_refused(self):
-        for wrong, shown in ((1.7, "1.7"), (-1, "-1"), ("bar", "'bar'"), ("5", "'5'"), (1 + 2**32, "4294967297"),
-                             (2**70, str(2**70)), (numpy.array([1.7]), "1.7"), (numpy.array([-1]), "-1"),
-                             (numpy.nan, "nan"), ([1, 2**40], str(2**40))):
-            points = [POINT] * numpy.size(wrong)
-            self.refused(f"an entry of objects is {shown}; it must be an object that Scene.add or Trace.add returned",
-                         made, impacts=carillon.Impacts(wrong, points, points))
-            self.refused(f"an entry of partners is {shown}; it must be a whole number from 0 to 4294967295 that names",
-                         made, contacts=carillon.Contacts(1, points, points, partners=wrong))
-        step = made(contacts=carillon.Contacts(numpy.array([3.0]), POINT, IMPULSE, partners=2**32 - 1))
-        self.assertEqual(list(step.contact_columns[0].object), [3])
-        self.assertEqual(list(step.contact_columns[0].partner), [2**32 - 1])
-        self.refused("handle of add is -1; it must be a whole number", carillon.Trace().add, "modalModels/1", handle=-1)
-
     def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
         self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
                      "daemon", made, impacts=carillon.Impacts(1, POINT, IMPULSE, durations=[-5]))
@@ -182,28 +125,6 @@ class RefusalsTest(MessagesTest):
         self.refused("duration is -5; it must be zero seconds or more", bell.strike, POINT, IMPULSE, -5)
         step = made(impacts=carillon.Impacts(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
         self.assertEqual(list(step.contact_columns[0].duration_s), [-1, 0])
-
-    def test_a_strike_is_refused_by_its_own_names(self):
-        scene = carillon.Scene(self.c, "scenes/1")
-        bell = carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(handle=1))
-        self.refused("point is (0, 0); it must be three numbers: x, y, z, metres in the object's own frame",
-                     bell.strike, (0, 0), IMPULSE)
-        self.refused("impulse is None; it must be three numbers: x, y, z, newton seconds in the object's own frame",
-                     bell.strike, POINT, None)
-
-    def test_a_strike_without_an_impulse_is_refused_because_it_would_be_silent(self):
-        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
-        summary = modal_model_service_pb2.ModalModelSummary(name="modalModels/1")
-        for strike in (bell.strike, carillon.Model(self.c, summary, "oak").render_strike):
-            self.refused("impulse is (0, 0, 0); it must be other than zero, because the strike would be silent",
-                         strike, POINT, (0, 0, 0))
-        made(impacts=carillon.Impacts(1, POINT, (0, 0, 0)))
-
-    def test_a_trace_of_contacts_needs_the_length_of_its_steps_as_a_stream_does(self):
-        contacts, impacts = (kind(1, POINT, IMPULSE) for kind in (carillon.Contacts, carillon.Impacts))
-        self.refused("Trace(step=1/240)", carillon.Trace().step, 0, contacts=contacts)
-        carillon.Trace().step(0, impacts=impacts)
-        carillon.Trace(step=1 / 240).step(0, contacts=contacts)
 
     def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_and_the_trace_can_be_continued(self):
         trace = carillon.Trace()
@@ -222,28 +143,6 @@ class RefusalsTest(MessagesTest):
         self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
         trace.step(1795853690.812)
         refused(r"time goes back from 1795853690\.812 s to 1795853690\.5 s at step 4;", 1795853690.5)
-
-    def test_an_empty_name_of_a_model_is_refused_with_the_name_of_the_argument(self):
-        for text in ("", "modalModels/", None):
-            self.refused(f"the model is {text!r}; it must be its label, its name, or the first digits of its digest",
-                         self.c.model, text)
-        for add in (carillon.Scene(self.c, "scenes/1").add, carillon.Trace().add):
-            self.refused("the model is ''; it must be a Model, or its name", add, "", "oak")
-
-    def test_a_message_that_is_too_large_tells_how_to_repair_it(self):
-        class TooLarge(grpc.RpcError):
-            def trailing_metadata(self):
-                return ()
-
-            def code(self):
-                return grpc.StatusCode.RESOURCE_EXHAUSTED
-
-            def details(self):
-                return "Received message larger than max (2500022 vs. 2097152)"
-
-        self.assertEqual(str(carillon.errors.from_rpc(TooLarge(), "unix:/nowhere")),
-                         "MESSAGE_TOO_LARGE: a message of 2500022 bytes: the daemon takes at most 2097152; report "
-                         "fewer points in a step, or ask for less in one call")
 
     def test_a_refusal_is_told_as_the_daemon_wrote_it_with_the_first_remedy(self):
         info = error_pb2.ErrorInfo(reason="INVALID", message="step_s is 0; say",
@@ -279,18 +178,6 @@ class ErrorsTest(unittest.TestCase):
 
 
 class WaitingTest(MessagesTest):
-    def test_progress_says_why_a_job_waits(self):
-        state, cause = decomposition_pb2.JOB_STATE_QUEUED, "WAIT_CAUSE_"
-        for wait, expected in (({"earlier_job_count": 1}, "waiting: 1 job is before it"),
-                               ({"earlier_job_count": 3}, "waiting: 3 jobs are before it"),
-                               ({"cause": cause + "WORKER", "running_job_count": 2}, "waiting for one of 2 jobs"),
-                               ({"cause": cause + "MEMORY", "running_job_count": 1, "running_job_label": "bowl"},
-                                "waiting for the memory of bowl"),
-                               ({"cause": cause + "COARSE_MODEL"}, "waiting for its coarse model"), ({}, "waiting")):
-            job = decomposition_pb2.Job(state=state, wait=wait)
-            self.assertEqual(carillon.progress.activity(job), expected)
-        running = decomposition_pb2.Job(state="JOB_STATE_RUNNING", progress={"phase": "PHASE_MESH"})
-        self.assertEqual(carillon.progress.activity(running), "mesh")
 
     def test_a_recording_that_ends_early_raises_the_error_of_the_package(self):
         class Lost(grpc.RpcError):
@@ -321,30 +208,6 @@ class WaitingTest(MessagesTest):
             with self.assertRaisesRegex(carillon.ServerUnavailable, "no daemon answers at unix:/nowhere"):
                 with block as record:
                     record.take(*arguments)
-
-
-class ShortFormsTest(MessagesTest):
-    def test_all_that_a_user_meets_is_shown_in_one_short_line(self):
-        scene = carillon.Scene(self.c, "scenes/1")
-        summary = modal_model_service_pb2.ModalModelSummary(name="modalModels/1", label="bell", header={
-            "mode_count": 1, "node_count": 12})
-        rendering = audio_service_pb2.RenderSummary(frame_count=4800, accepted_count=1, peak_pa=2)
-        trace = carillon.Trace()
-        trace.add("modalModels/1")
-        trace.step(0.5)
-        sound = carillon.Sound(numpy.zeros((4800, 1), numpy.float32), 48000, summary=rendering)
-        model = carillon.Model(self.c, summary)
-        for item, expected in (
-                (self.c, "<Client of unix:/nowhere>"), (scene, "<Scene scenes/1 of unix:/nowhere>"),
-                (model, "<Model bell: 1 mode>"),
-                (carillon.aio.AsyncModel(self.c, summary), "<AsyncModel bell: 1 mode>"),
-                (trace, "<Trace: 1 object, 1 step, to 0.5 s>"),
-                (sound, "<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>"),
-                (carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(
-                    handle=3, sounding_mode_count=1, lowest_frequency_hz=440, highest_frequency_hz=440)),
-                 "<SoundingObject 3: 1 mode, 440.0 to 440.0 Hz>")):
-            self.assertEqual(repr(item), expected)
-        self.assertIn("<audio controls", sound._repr_html_())
 
 
 class AioTest(unittest.TestCase):

@@ -367,35 +367,6 @@ class CClientTest(DaemonTest):
         self.c.carillon_delete_scene(again)
         self.c.carillon_delete_scene(scene)
 
-    def test_registrations_without_an_id_or_a_handle_are_refused(self):
-        scene = ctypes.c_void_p()
-
-        def register(*registration):
-            return self.c.carillon_register_scene(self.connection, ctypes.byref(Registration(*registration)),
-                                                  ctypes.byref(scene))
-
-        self.assertEqual(register(b"", None, None, 0), 3)
-        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")
-        bar = Object(b"modalModels/" + b"0" * 64, meshes.MATERIAL.encode())
-        self.assertEqual(register(b"a", None, ctypes.pointer(bar), 1), 3)
-        self.assertEqual(self.c.carillon_error_reason(), b"INVALID_SETTINGS")
-        self.assertEqual(register(b"a", None, None, 1), 3)
-        self.assertIn(b"null pointer", self.c.carillon_error())
-        self.assertIsNone(scene.value)
-
-    def test_mistakes_have_a_code_and_a_reason(self):
-        code, _ = self.model_of_arrays(VERTICES, [(0, 1, 99)])
-        self.assertEqual((code, self.c.carillon_error_reason()), (3, b"MESH_INDEX_OUT_OF_RANGE"))
-        self.assertEqual(self.c.carillon_connect(b"unix:/nowhere", ctypes.byref(ctypes.c_void_p())), 14)
-        self.assertEqual(self.c.carillon_error_reason(), b"SERVER_UNAVAILABLE")
-        for call in (lambda: self.c.carillon_connect(None, None), lambda: self.c.carillon_stop(None),
-                     lambda: self.c.carillon_send(None, None), lambda: self.c.carillon_create_scene(None, None, None)):
-            self.assertEqual(call(), 3)
-            self.assertIn(b"null pointer", self.c.carillon_error())
-        # What ends something takes nothing for done.
-        for end in ("delete_scene", "disconnect", "free_sound", "close_stream", "close_trace"):
-            getattr(self.c, "carillon_" + end)(None)
-
 
 if __name__ == "__main__":
     unittest.main()

@@ -41,15 +41,6 @@ class CallsTest(DaemonTest):
         self.assertIn("decomposition", info.features)
         self.assertEqual(info.sample_rate_hz, self.c.status().format.sample_rate_hz)
 
-    def test_a_gltf_brings_the_file_with_its_data(self):
-        file = meshes.gltf_with_buffer(meshes.BAR_SIZE, self.folder)
-        model = self.c.create_model(file, meshes.MATERIAL)
-        self.assertEqual(model.mode_count, self.model.mode_count)
-        file.write_text(file.read_text().replace("box.bin", "../box.bin"))
-        with self.assertRaises(carillon.CarillonError) as raised:
-            self.c.create_model(file, meshes.MATERIAL)
-        self.assertEqual(raised.exception.reason, "MESH_UNREADABLE")
-
     def test_a_scene_with_an_id_is_found_again_with_its_objects(self):
         made = self.c.scene(id="lathe-1", gain=0.5)
         self.assertEqual((made.name, made.existing), ("scenes/lathe-1", False))
@@ -165,17 +156,6 @@ class CallsTest(DaemonTest):
                          [("CONTACTS_LATE", 1, {"scheduling_delay_s": 0})])
         self.assertEqual((stream.late_count, stream.remap_count), (1, 0))
 
-    def test_a_stream_that_was_closed_refuses_further_steps(self):
-        with self.c.scene() as scene:
-            with scene.stream(step=0.01) as closed:
-                pass
-            left = scene.stream(step=0.01)
-            with self.assertRaises(KeyError), left:
-                raise KeyError
-            for stream in closed, left:
-                with self.assertRaisesRegex(carillon.CarillonError, "CONTACT_STREAM_ENDED: .* open another one"):
-                    stream.step(1.0)
-
     def test_a_scene_that_is_gone_hides_no_exception_of_its_block(self):
         with self.c.scene() as scene:
             scene.delete()
@@ -202,20 +182,6 @@ class CallsTest(DaemonTest):
         self.assertEqual((state, handles), ("succeeded", [1]))
         numpy.testing.assert_array_equal(frequencies, self.model.frequencies())
         self.assertEqual(*peaks)
-
-    def test_a_mesh_has_the_unit_and_the_accuracy_that_are_asked_for(self):
-        vertices, triangles = BAR
-        model = self.c.create_model((1000 * numpy.array(vertices), triangles), meshes.MATERIAL, unit="mm",
-                                    accuracy=0.05)
-        self.assertAlmostEqual(model.frequencies()[0] / self.model.frequencies()[0], 1, delta=0.05)
-        self.assertEqual(model.summary.header.settings.mesh.accuracy, 0.05)
-
-    def test_a_trace_without_contacts_is_refused(self):
-        trace = carillon.Trace(1 / 60)
-        trace.add(self.model)
-        trace.step(0.0)
-        with self.assertRaisesRegex(carillon.CarillonError, "TRACE_EMPTY: the trace holds no contact"):
-            self.c.render(trace)
 
     def test_more_renderings_than_a_client_may_have_wait_in_asyncio(self):
         async def render():

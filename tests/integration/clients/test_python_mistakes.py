@@ -10,20 +10,10 @@ import warnings
 import numpy
 
 import carillon
-import meshes
-from test_python_package import BAR, IMPULSE, POINT, PackageTest
+from test_python_package import IMPULSE, POINT, PackageTest
 
 
 class MistakesTest(PackageTest):
-    def test_a_model_that_keeps_its_label_is_told(self):
-        with self.assertWarnsRegex(carillon.LabelWarning, "known as 'bar' and keeps this label, so that 'beam'"):
-            self.assertEqual(self.c.create_model(BAR, meshes.MATERIAL, label="beam").label, "bar")
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", carillon.LabelWarning)
-            self.c.create_model(BAR, meshes.MATERIAL, label="bar")
-            self.c.create_model(BAR, meshes.MATERIAL)
-            # The daemon would cut this label of 201 bytes within its last letter, and would leave that letter out.
-            self.c.create_model(BAR, meshes.MATERIAL, label=199 * "x" + "ö")
 
     def test_a_stream_that_is_not_closed_is_told_at_the_end_of_the_program(self):
         script = ("import carillon, time\n"

@@ -9,7 +9,6 @@ import numpy
 
 import carillon
 import meshes
-import sound
 from carillon.v1 import contact_pb2
 from daemon import DaemonTest
 
@@ -153,18 +152,6 @@ class SoundTest(PackageTest):
                         for samples in (joined, at_once.samples[:, 0]))
         numpy.testing.assert_array_equal(joined[first:], at_once.samples[other:other + len(joined) - first, 0])
 
-    def test_a_saved_sound_reads_back(self):
-        heard = self.model.render_strike(POINT, IMPULSE, seconds=0.2)
-        heard.save(self.folder / "strike.wav")
-        numpy.testing.assert_allclose(sound.read_wave(self.folder / "strike.wav"), heard.samples, atol=2**-23)
-
-    def test_a_strike_that_is_refused_raises(self):
-        with self.c.scene() as scene:
-            bar = scene.add(self.model)
-            with self.assertRaises(carillon.CarillonError) as refused:
-                bar.strike(POINT, (0, 0, float("nan")))
-        self.assertEqual(refused.exception.reason, "CONTACT_MALFORMED")
-
     def test_contacts_of_a_stream_are_counted_and_poses_taken(self):
         with self.c.scene() as scene:
             bars = [scene.add(self.model, pose=((i, 0, 0), (1, 0, 0, 0))) for i in range(2)]
@@ -195,22 +182,6 @@ class SoundTest(PackageTest):
             self.assertGreater(scene.listen(0.3).peak, 0)
             scene.stop()
             self.assertGreaterEqual(self.c.stop_all(), 1)
-
-    def test_the_output_is_turned_down(self):
-        self.assertEqual(self.c.set_volume(gain=0.25).gain, 0.25)
-        self.assertEqual(self.c.status().gain, 0.25)
-        self.c.set_volume(gain=1)
-
-    def test_integers_of_16_bits_are_the_floats_rounded(self):
-        with self.c.scene() as scene:
-            bar = scene.add(self.model)
-            with (self.c.recording(scene=scene.name) as floats,
-                  self.c.recording(scene=scene.name, encoding="AUDIO_ENCODING_INT16") as integers):
-                bar.strike(POINT, IMPULSE, DURATION_S)
-                one, other = (record.take(1.0).samples[:, 0] for record in (floats, integers))
-        first, second = (int(numpy.flatnonzero(numpy.abs(samples) > 1e-3)[0]) for samples in (one, other))
-        count = len(one) - max(first, second)
-        self.assertLess(numpy.abs(one[first:first + count] - other[second:second + count]).max(), 0.51 / 32767)
 
     def test_a_stream_that_is_too_fast_drops_the_oldest_steps(self):
         with self.c.scene() as scene:
@@ -274,34 +245,6 @@ class ContactsTest(PackageTest):
         self.assert_same(self.rendered(*((i / 240, {"contacts": contacts}) for i in range(3))),
                          self.c.render(trace, tail_s=0.3))
 
-    def test_an_offset_delays_a_strike_within_its_step(self):
-        def strike(**columns):
-            return {"impacts": carillon.Impacts(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
-        self.assert_same(self.rendered((0.25, strike())), self.rendered((0.0, strike(time_offsets=0.25))))
-
-    def test_the_frame_of_the_scene_is_turned_into_that_of_the_object(self):
-        half = 0.5**0.5
-        pose = ((1, 2, 3), (half, 0, 0, half))  # a quarter turn about z: x of the object is y of the scene
-        x, y, z = POINT
-        own = self.rendered((0.0, {"impacts": carillon.Impacts(1, POINT, (0, 1e-3, -2e-3), durations=DURATION_S)}))
-        scene = self.rendered((0.0, {"impacts": carillon.Impacts(1, (1 - y, 2 + x, 3 + z), (-1e-3, 0, -2e-3),
-                                                                 durations=DURATION_S)}),
-                              poses=[pose], frame="scene")
-        numpy.testing.assert_allclose(scene.samples, own.samples, atol=1e-5 * own.peak)
-
-    def test_a_second_object_is_struck_too(self):
-        def strike(**columns):
-            return {"impacts": carillon.Impacts(1, POINT, IMPULSE, durations=DURATION_S, **columns)}
-        x, y, _ = POINT
-        bottom = (x, y, 0)
-        alone = self.rendered((0.0, strike()), object_count=2)
-        both = self.rendered((0.0, strike(second_objects=2, second_points=bottom)), object_count=2)
-        self.assertGreater(numpy.abs(both.samples - alone.samples).max(), 0.1 * alone.peak)
-        # Upside down: the second bar is struck as the first one is, so that the sound is twice as loud.
-        turned = self.rendered((0.0, strike(second_objects=2, second_points=POINT, second_rotations=(0, 1, 0, 0))),
-                               object_count=2)
-        numpy.testing.assert_allclose(turned.samples, 2 * alone.samples, atol=1e-4 * alone.peak)
-
     def test_the_striker_sets_how_bright_a_strike_is(self):
         def share_above_8_khz(**strike):
             frequencies, magnitude = self.model.render_strike(POINT, IMPULSE, seconds=0.3, **strike).spectrum()
@@ -337,18 +280,6 @@ class ContactsTest(PackageTest):
             with scene.stream(step=1 / 240) as stream:
                 stream.step(0.0, **far)
         self.assertEqual([(one.id, one.count) for one in stream.warnings], [("POINTS_DISTANT", 1)])
-
-    def test_an_impulse_that_no_body_bears_is_refused(self):
-        enormous = (0, 0, -1e9)
-        with self.c.scene() as scene:
-            bar = scene.add(self.model)
-            with self.assertRaises(carillon.CarillonError) as refused:
-                bar.strike(POINT, enormous)
-            self.assertEqual(refused.exception.reason, "IMPULSE_TOO_LARGE")
-            with self.assertWarnsRegex(carillon.ContactWarning, "IMPULSE_TOO_LARGE"), scene.stream(1 / 240) as stream:
-                stream.step(0.0, contacts=carillon.Contacts(bar, [POINT, POINT], [enormous, IMPULSE]))
-            self.assertEqual(stream.rejection.reason, "IMPULSE_TOO_LARGE")
-            self.assertEqual(stream.report.rejected_count, 1)
 
 
 class AioTest(PackageTest):

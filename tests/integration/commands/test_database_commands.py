@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands that look after stored models, with a running daemon and without."""
 
-import datetime
 import hashlib
 import json
 import os
@@ -13,7 +12,6 @@ import subprocess
 import tempfile
 import unittest
 
-import meshes
 import scripted
 import strike
 from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc
@@ -98,21 +96,6 @@ class DatabaseCommandsTest(unittest.TestCase):
         answer = json.loads(self.run_command("--json", "model", "list", *options))
         return [model["label"] for model in answer["modal_models"]], answer["next_page_token"]
 
-    def test_models_are_listed_by_size_and_date(self):
-        shown = json.loads(self.run_command("--json", "model", "show", "bar"))
-        mib = int(shown["stored_bytes"]) / 2**20
-        for options, found in ((("--min-mib", mib), True), (("--min-mib", mib + 0.01), False),
-                               (("--max-mib", mib), True), (("--max-mib", mib - 0.01), False),
-                               (("--max-mib", 0), False), (("--since", "2026-01-01"), True),
-                               (("--since", "2999-12-31T23:59:59Z"), False),
-                               (("--before", "2999-12-31"), True),
-                               (("--before", "2026-01-01T00:00"), False)):
-            self.assertEqual(self.listed(*options)[0], ["bar"] if found else [], options)
-        created = datetime.datetime.fromtimestamp(int(shown["created_unix_ms"]) // 1000 + 1,
-                                                  datetime.timezone.utc).isoformat()
-        self.assertEqual(self.listed("--before", created)[0], ["bar"])
-        self.assertEqual(self.listed("--since", created)[0], [])
-
     def test_models_are_listed_page_by_page(self):
         self.import_copies(4)
         everything, token = self.listed()
@@ -123,23 +106,6 @@ class DatabaseCommandsTest(unittest.TestCase):
         printed = self.run_command("model", "list", "--page-size", 3).splitlines()
         self.assertEqual((len(printed), printed[3]), (4, f"more with --page-token {token}"))
         self.assertEqual([model.label for model in self.daemon.client().list(page_size=2)], everything)
-
-    def test_accuracy_in_percent_and_a_budget_reach_the_decomposition(self):
-        mesh = self.folder / "block.obj"
-        mesh.write_bytes(meshes.bar())
-        self.run_command("model", "create", mesh, "--material", meshes.MATERIAL, "--accuracy", "50%",
-                         "--budget", "60:1.5", "--wait")
-        settings = json.loads(self.run_command("--json", "model", "show", "block"))["header"]["settings"]
-        self.assertEqual([settings["mesh"][name] for name in ("accuracy", "budget_s", "budget_gib")],
-                         [0.5, 60, 1.5])
-
-    def test_figures_that_are_none_are_refused_as_usage(self):
-        for command in (("list", "--since", "yesterday"), ("list", "--page-size", 0),
-                        ("list", "--page-token", "x"), ("list", "--min-mib", -1),
-                        ("create", "bar.obj", "--accuracy", "0%"),
-                        ("create", "bar.obj", "--budget", "1:2:3")):
-            refused = self.daemon.command("model", *command, check=False)
-            self.assertEqual((refused.returncode, refused.stdout), (2, ""), command)
 
     def test_a_backup_restores_what_was_there_and_keeps_what_came_later_beside_it(self):
         backup = self.folder / "backup.db"
@@ -234,16 +200,6 @@ class DatabaseCommandsTest(unittest.TestCase):
             whole_count += exported.returncode == 0
         print(f"{whole_count} of 20 models are recovered from three quarters of the file", flush=True)
         self.assertGreater(whole_count, 5)
-
-    def test_a_folder_without_a_database_is_told_and_nothing_is_made_in_it(self):
-        other = self.folder / "other"
-        other.mkdir()
-        for folder in (other, self.folder / "nowhere"):
-            refused = self.offline("check", folder=folder)
-            self.assertEqual(refused.returncode, 1)
-            self.assertIn("FILE_NOT_FOUND: there is no database carillon.db in ", refused.stderr)
-        self.assertEqual(list(other.iterdir()), [])
-        self.assertFalse((self.folder / "nowhere").exists())
 
     def test_a_damaged_backup_is_refused_and_nothing_is_changed(self):
         backup = self.folder / "backup.db"
