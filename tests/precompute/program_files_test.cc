@@ -57,20 +57,6 @@ TEST_F(ProgramFilesTest, ModelFileIsTheStoredForm) {
               report.at("modes")[0].at("frequency_hz").get<double>(), 1e-6);
 }
 
-TEST_F(ProgramFilesTest, FilesThatAreNotThereAreRefused) {
-  EXPECT_EQ(ReasonOf(Run(folder + "/none.obj --out " + model + " --material brass --json")),
-            "FILE_NOT_FOUND");
-  EXPECT_EQ(ReasonOf(Run(bar + " --unit mm --element linear --nodes 100 --material brass --json "
-                               "--out /nowhere/bar.modes")),
-            "OUTPUT_NOT_WRITABLE");
-}
-
-TEST_F(ProgramFilesTest, WhatIsNoFileOfAMeshIsRefused) {
-  const std::string rest = " --out " + model + " --format obj --material brass --json";
-  EXPECT_EQ(ReasonOf(Run(folder + rest)), "FILE_NOT_FOUND");
-  EXPECT_EQ(ReasonOf(Run("/dev/zero" + rest)), "MESH_TOO_LARGE");
-}
-
 TEST_F(ProgramFilesTest, AMeshMayComeFromAPipe) {
   const std::string pipe = folder + "/pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
@@ -98,18 +84,6 @@ TEST_F(ProgramFilesTest, ADeviceIsWrittenToAndALinkStays) {
   EXPECT_EQ(Run(small + " --out " + link).exit_status, 0);
   EXPECT_TRUE(std::filesystem::is_symlink(link));
   EXPECT_GT(std::filesystem::file_size(folder + "/target"), 0);
-}
-
-TEST_F(ProgramFilesTest, AReportThatCannotBeWrittenIsAnError) {
-  for (const char* output : {" >/dev/full", " >&-"}) {
-    for (const char* form : {" --json", ""}) {
-      const std::string command = bar + " --out " + model + " --unit mm --nodes 100" + kSteel +
-                                  form + " --threads 1" + output;
-      // Run adds its own options behind a comment sign.
-      EXPECT_NE(Run(command + " #").exit_status, 0) << command;
-      EXPECT_FALSE(ReadRecords(model).empty());
-    }
-  }
 }
 
 }  // namespace

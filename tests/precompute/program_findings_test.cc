@@ -86,51 +86,6 @@ TEST_F(ProgramFindingsTest, ASlenderBodyIsRefusedAsSlender) {
   EXPECT_EQ(ReasonOf(result), "BODY_TOO_SLENDER");
 }
 
-TEST_F(ProgramFindingsTest, AWallOfZeroIsNone) {
-  EXPECT_EQ(RunBar(std::string(kSteel) + " --wall 0").exit_status, 0);
-}
-
-TEST_F(ProgramFindingsTest, RefusalsNameOptionsAndWhatIsMissing) {
-  EXPECT_EQ(ReasonOf(RunBar("--young 2e11 --poisson 0.3")), "INVALID_SETTINGS");
-  EXPECT_THAT(OnStandardError(), HasSubstr("give --density, or"));
-  EXPECT_EQ(ReasonOf(RunBar("--material brass --young -1")), "INVALID_MATERIAL");
-  EXPECT_THAT(OnStandardError(), HasSubstr("--young is -1"));
-  EXPECT_EQ(ReasonOf(RunBar("--material brass --fix plane:0,0,0")), "INVALID_SETTINGS");
-  EXPECT_THAT(OnStandardError(), HasSubstr("--fix: \"plane:0,0,0\" does not"));
-  EXPECT_EQ(ReasonOf(RunBar("--material brass --transfer-budget -1")), "INVALID_SETTINGS");
-  EXPECT_LT(OnStandardError().size(), 200U);
-}
-
-TEST_F(ProgramFindingsTest, NodesBesideAnAccuracyAreToldToBeThoseOfTheFirstMesh) {
-  ASSERT_EQ(
-      Run(bar + " --out " + model + " --unit mm --nodes 300 --accuracy 10%" + kSteel).exit_status,
-      0);
-  EXPECT_THAT(OnStandardError(), HasSubstr("the 300 nodes asked for"));
-}
-
-TEST_F(ProgramFindingsTest, FewerNodesThanTheSurfaceForcesAreToldSo) {
-  ASSERT_EQ(Run(bar + " --out " + model + " --unit mm --nodes 3" + kSteel).exit_status, 0);
-  EXPECT_THAT(OnStandardError(), HasSubstr("corner nodes, not the 3 asked for"));
-}
-
-TEST_F(ProgramFindingsTest, ABodyOfAHundredMetresAsksForItsUnit) {
-  const std::string options = bar + " --out " + model + " --nodes 100 --json" + kSteel;
-  const Result result = Run(options + " --band 20000");
-  EXPECT_EQ(ReasonOf(result), "MESH_UNIT_UNCLEAR");
-  // Without a band the work is bounded, and a warning suffices.
-  EXPECT_THAT(Json::parse(Run(options).output).at("warnings").dump(),
-              HasSubstr("give the unit of the file (--unit mm)"));
-  const Json remedy = Json::parse(result.output).at("error").at("remedies").at(0);
-  EXPECT_EQ(remedy.at("option"), "--unit");
-  EXPECT_EQ(Run(options + " --unit " + remedy.at("value").get<std::string>()).exit_status, 0);
-}
-
-TEST_F(ProgramFindingsTest, WordsThatAreNoUtf8AreReportedAsJson) {
-  std::ofstream(bar, std::ios::trunc) << "v 1 2 3\nv caf\xe9 0 0\nf 1 1 1\n";
-  EXPECT_EQ(ReasonOf(RunBar(kSteel)), "MESH_UNREADABLE");
-  EXPECT_THAT(OnStandardError(), HasSubstr("line 2: \"caf\\xe9\" is no coordinate"));
-}
-
 TEST_F(ProgramFindingsTest, OnlyRemediesThatHelpAnOpenSurfaceAreOffered) {
   const auto options_of = [&] {
     const Result result = RunBar(kSteel);

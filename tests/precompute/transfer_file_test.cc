@@ -198,35 +198,5 @@ TEST_F(TransferFileTest, IsTheSameWhetherTheModesAreComputedOrStored) {
   EXPECT_EQ(report.at("radiation").at("modes_computed"), stored.header.computed_mode_count());
 }
 
-TEST_F(TransferFileTest, ARequestFileAndFlagsMakeTheSameTransfer) {
-  Run("--transfer-budget 1000 --transfer-accuracy 1");
-  std::ofstream(folder + "/request")
-      << "radiate_stored_model: true size: 2 max_frequency_hz: 8000 min_frequency_hz: 20 "
-         "transfer { budget_s: 1000 accuracy_db: 1 } "
-         "material { young_pa: 210e9 poisson_ratio: 0.3 density_kg_per_m3: 7850 "
-         "alpha1_s: 0 alpha2_per_s: 0 }";
-  Execute(folder + "/bar.modes --out " + folder + "/apart --request " + folder + "/request");
-  EXPECT_TRUE(ReadTransfer(folder + "/apart").arrays ==
-              ReadTransfer(folder + "/bar.modes.transfer").arrays);
-}
-
-TEST_F(TransferFileTest, RefusesWhatIsNoStoredModel) {
-  const auto reason = [&](const std::string& file) {
-    const Json report = Execute(file + " --radiate --out " + folder + "/none" + kUse);
-    return report.at("error").at("reason").get<std::string>();
-  };
-  EXPECT_EQ(reason(folder + "/missing"), "FILE_NOT_FOUND");
-  EXPECT_EQ(reason(folder + "/bar.obj"), "MODAL_MODEL_MALFORMED");
-  Run("--transfer-budget 0.001");
-  std::fstream model(folder + "/bar.modes", std::ios::in | std::ios::out | std::ios::binary);
-  const int last = (model.seekg(-1, std::ios::end), model.peek());
-  model.seekp(-1, std::ios::end).put(static_cast<char>(last ^ 1));
-  model.close();
-  EXPECT_EQ(reason(folder + "/bar.modes"), "MODAL_MODEL_CORRUPT");
-  std::filesystem::resize_file(folder + "/bar.modes",
-                               std::filesystem::file_size(folder + "/bar.modes") / 2);
-  EXPECT_EQ(reason(folder + "/bar.modes"), "MODAL_MODEL_MALFORMED");
-}
-
 }  // namespace
 }  // namespace carillon::precompute

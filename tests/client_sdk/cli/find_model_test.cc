@@ -67,13 +67,6 @@ TEST(FindModel, SaysThatTheJobOfAModelWaitsOrRunsAndHowToWaitForIt) {
   }
 }
 
-TEST(FindModel, SaysWhyTheJobOfAModelFailed) {
-  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_FAILED), "bell"),
-              AllOf(HasSubstr("MESH_NOT_CLOSED: the surface has 12 open edges"),
-                    HasSubstr("`carillon model create` again")));
-  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_CANCELLED), "bell"), HasSubstr("cancelled"));
-}
-
 TEST(FindModel, SaysNothingOfJobsThatDoNotMakeTheModel) {
   EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl"),
               AllOf(HasSubstr("`carillon model list`"), Not(HasSubstr("job"))));
@@ -104,48 +97,11 @@ class DaemonWithModels : public client::Client {
   v1::ListModalModelsResponse list_;
 };
 
-TEST(FindModel, SaysWhichModelsAnAmbiguousNameMeansInOneShortLine) {
-  const std::string two(FindModel(DaemonWithModels(2), "bell").status().message());
-  EXPECT_THAT(two, AllOf(HasSubstr("2 of the models: aaaaaaaaaaaa, bbbbbbbbbbbb;"),
-                         HasSubstr("NAME_AMBIGUOUS"), Not(HasSubstr("more"))));
-  const std::string six(FindModel(DaemonWithModels(6), "bell").status().message());
-  EXPECT_THAT(six, HasSubstr("dddddddddddd and 2 more;"));
-  EXPECT_LT(six.size(), 200U);
-}
-
 TEST(FindModel, NamesTheNearestLabel) {
   EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "bel").status().message()),
               HasSubstr("did you mean 'bell'? `carillon model list`"));
   EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "chime").status().message()),
               Not(HasSubstr("did you mean")));
-}
-
-TEST(OtherLabel, SaysThatAModelKeepsItsLabel) {
-  v1::ModalModelSummary model;
-  model.set_label("key_maple");
-  EXPECT_THAT(OtherLabel(model, "key_oak"),
-              HasSubstr("as 'key_maple' and keeps this label, so that 'key_oak' does not name"));
-  EXPECT_EQ(OtherLabel(model, "key_maple"), "");
-  EXPECT_EQ(OtherLabel(model, std::string(201, 'x')), "");
-  // The daemon would cut the second label within a letter, and leaves that letter out.
-  EXPECT_NE(OtherLabel(model, absl::StrCat(std::string(198, 'x'), "ö")), "");
-  EXPECT_EQ(OtherLabel(model, absl::StrCat(std::string(199, 'x'), "ö")), "");
-}
-
-TEST(SharedLabel, SaysHowToNameEachModelOfALabel) {
-  const DaemonWithModels three(3);
-  EXPECT_THAT(
-      SharedLabel(three, three.newest()),
-      AllOf(HasSubstr("'bell' now means 3 models: name this one aaaaaaaaaaaa and the others "
-                      "bbbbbbbbbbbb, cccccccccccc"),
-            HasSubstr("`carillon model tag --label`")));
-  const DaemonWithModels one(1);
-  EXPECT_EQ(SharedLabel(one, one.newest()), "");
-}
-
-TEST(FindJob, NamesTheCommandThatListsJobs) {
-  const auto found = FindJob(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl");
-  EXPECT_THAT(std::string(found.status().message()), HasSubstr("`carillon job list`"));
 }
 
 }  // namespace

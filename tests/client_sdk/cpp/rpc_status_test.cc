@@ -29,27 +29,11 @@ TEST(RpcStatus, CarriesReasonMessageAndFiguresOfTheRichStatus) {
   EXPECT_EQ(received.metadata().at("edge_count"), "12");
 }
 
-TEST(RpcStatus, ReadsDetailsPackedByOtherToolsAsPlainMessage) {
-  // Another tool's detail within the rich status is passed over.
-  v1::StatusDetails details;
-  details.add_details()->set_type_url("type.googleapis.com/google.rpc.Help");
-  const absl::Status status = FromRpc(
-      grpc::Status(grpc::StatusCode::NOT_FOUND, "JOB_NOT_FOUND: no", details.SerializeAsString()),
-      "unix:/x");
-  EXPECT_EQ(ToErrorInfo(status).reason(), "JOB_NOT_FOUND");
-}
-
 TEST(RpcStatus, NamesTheServerThatDoesNotAnswer) {
   const absl::Status status =
       FromRpc(grpc::Status(grpc::StatusCode::UNAVAILABLE, "refused"), "unix:/run/c.sock");
   EXPECT_THAT(status.ToString(), HasSubstr("SERVER_UNAVAILABLE: "));
   EXPECT_THAT(status.ToString(), HasSubstr("unix:/run/c.sock"));
-}
-
-TEST(RpcStatus, TellsAUserWithoutTheRightWhichGroupHasIt) {
-  const absl::Status status =
-      FromRpc(grpc::Status(grpc::StatusCode::UNAVAILABLE, "unix:/x: Permission denied"), "unix:/x");
-  EXPECT_THAT(status.ToString(), HasSubstr("join the group carillon"));
 }
 
 TEST(RpcStatus, TellsHowToRepairAMessageThatIsTooLarge) {
@@ -60,8 +44,6 @@ TEST(RpcStatus, TellsHowToRepairAMessageThatIsTooLarge) {
   EXPECT_EQ(ToErrorInfo(status).reason(), "MESSAGE_TOO_LARGE");
   EXPECT_THAT(status.ToString(), HasSubstr("report fewer points in a step"));
 }
-
-TEST(RpcStatus, IsOkWhereTheCallWas) { EXPECT_TRUE(FromRpc(grpc::Status::OK, "x").ok()); }
 
 }  // namespace
 }  // namespace carillon::client

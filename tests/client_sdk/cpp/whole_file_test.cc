@@ -66,18 +66,6 @@ TEST_F(WholeFileTest, LeavesAnOlderFileAsItIsAndNothingElseUnlessItIsPublished) 
   EXPECT_EQ(Count(), 1);
 }
 
-TEST_F(WholeFileTest, FollowsLinksToAFileThatMayBeMissing) {
-  fs::create_symlink("second", folder_ / "first");
-  fs::create_symlink("copy.db", folder_ / "second");
-  for (const char* text : {"a copy", "a newer copy"}) {
-    absl::StatusOr<WholeFile> file = WholeFile::Create(folder_ / "first");
-    ASSERT_TRUE(file.ok()) << file.status();
-    ASSERT_TRUE(file->Write(text).ok() && file->Publish().ok());
-    EXPECT_EQ(TextOf(file_), text);
-  }
-  EXPECT_TRUE(fs::is_symlink(folder_ / "second"));
-}
-
 TEST_F(WholeFileTest, RefusesTheFilesOfADatabaseInUse) {
   for (const char* companion : {"-wal", "-shm", "-reserve", "-journal"}) {
     const std::string beside = file_.string() + companion;
@@ -98,27 +86,6 @@ TEST_F(WholeFileTest, RefusesNamesThatTheDaemonRemoves) {
   EXPECT_TRUE(WholeFile::Create(unfinished).ok());
   Put(file_, "live");
   EXPECT_THAT(Refused(unfinished), HasSubstr("OUTPUT_NOT_WRITABLE: "));
-}
-
-TEST_F(WholeFileTest, RefusesTheLockOfADataFolder) {
-  EXPECT_TRUE(WholeFile::Create(folder_ / "lock").ok());
-  Put(folder_ / "carillon.db", "live");
-  EXPECT_THAT(Refused(folder_ / "lock"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
-}
-
-TEST_F(WholeFileTest, RefusesTheFolderWork) {
-  fs::create_directory(folder_ / "work");
-  EXPECT_TRUE(WholeFile::Create(folder_ / "work/copy.db").ok());
-  Put(folder_ / "carillon.db", "live");
-  EXPECT_THAT(Refused(folder_ / "work/copy.db"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
-}
-
-TEST_F(WholeFileTest, LeavesAFileInMemoryAsItIsUnlessItIsPublished) {
-  const fs::path file = fs::path("/dev/shm") / absl::StrCat("whole_file_", getpid());
-  Put(file, "an older copy");
-  { EXPECT_TRUE(WholeFile::Create(file)->Write("a copy").ok()); }
-  EXPECT_EQ(TextOf(file), "an older copy");
-  fs::remove(file);
 }
 
 TEST_F(WholeFileTest, WritesAtOnceIntoAFileThatIsOpen) {

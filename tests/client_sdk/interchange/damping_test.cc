@@ -72,15 +72,5 @@ TEST(Damping, ModesBeyondThePointsOfAMaterialAreFittedBetween) {
   EXPECT_EQ(found.loss_factor(255).frequency_hz(), modes.back().natural_hz);
 }
 
-TEST(Damping, NoDampingIsNone) {
-  const v1::Material found = Fitted(RayleighModes(0, 0));
-  EXPECT_EQ(found.alpha1_s() + found.alpha2_per_s() + found.loss_factor_size(), 0);
-}
-
-TEST(Damping, OneModeIsFittedExactly) {
-  const std::vector<DampedMode> one = {{1600, 5}};
-  EXPECT_LT(DampingError(one, Fitted(one)), 1e-12);
-}
-
 }  // namespace
 }  // namespace carillon::interchange

@@ -53,22 +53,6 @@ double EnergyDensity(const Eigen::Matrix3d& gradient) {
 
 const Eigen::Matrix3d kGradient{{0.3, -0.7, 0.2}, {0.5, 0.1, 0.9}, {-0.4, 0.6, -0.8}};
 
-TEST(TetGeometry, GradientsOfBarycentricCoordinatesAreThoseOfTheInverse) {
-  const TetGeometry geometry = MakeTetGeometry(Corners());
-  Eigen::Matrix4d P;
-  P.topRows<3>() = Corners();
-  P.row(3).setOnes();
-  const Eigen::Matrix4d beta = P.inverse();
-  EXPECT_NEAR((beta.leftCols<3>() - geometry.gradients).norm(), 0, 1e-14);
-  EXPECT_NEAR(geometry.volume_m3, std::abs(P.determinant()) / 6, 1e-15);
-}
-
-TEST(TetGeometry, VolumeOfAMirroredTetrahedronIsNegative) {
-  Eigen::Matrix<double, 3, 4> corners = Corners();
-  corners.col(0).swap(corners.col(1));
-  EXPECT_LT(MakeTetGeometry(corners).volume_m3, 0);
-}
-
 TEST(LinearStiffness, EnergyOfAffineDisplacementIsThatOfElasticity) {
   const TetGeometry geometry = MakeTetGeometry(Corners());
   const auto u = Affine<4>(kGradient, {1, 2, 3});

@@ -15,7 +15,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 /// Steel at the size of its mesh, from 100 to 1000 Hz.
 constexpr double kLowHz = 100, kHighHz = 1000;
@@ -75,32 +74,6 @@ TEST(LeaveOutInaccurate, TheKeptModesAreThoseWithinTheLimitAndTheModelEndsBelowT
   EXPECT_EQ(model.complete_to_eigenvalue, std::nextafter(Use().UnitEigenvalue(300), 0));
   ASSERT_EQ(model.warnings.size(), 1U);
   EXPECT_THAT(model.warnings[0], HasSubstr("1 modes, the lowest at 300 Hz, were left out"));
-}
-
-TEST(LeaveOutInaccurate, WithoutALimitAllModesAreKeptAndNoneCanBeLeft) {
-  ModalModel model = ModelWith({200, 300}, {0.5, 0.6});
-  ASSERT_TRUE(LeaveOutInaccurate(0, Use(), model).ok());
-  EXPECT_EQ(model.eigenvalues.size(), 2U);
-  EXPECT_THAT(LeaveOutInaccurate(0.4, Use(), model).ToString(), HasSubstr("ACCURACY_NOT_REACHED"));
-}
-
-TEST(ModelWarnings, OnlyErrorsAboveTheGreatOneAreWarnedOf) {
-  ModalModel model = ModelWith({200, 300}, {kGreatError, kGreatError});
-  WarnOfGreatErrors(model);
-  EXPECT_THAT(model.warnings, IsEmpty());
-  model.estimated_errors[1] = 1.01 * kGreatError;
-  WarnOfGreatErrors(model);
-  ASSERT_EQ(model.warnings.size(), 1U);
-  EXPECT_THAT(model.warnings[0], HasSubstr("frequencies of 1 of 2 modes"));
-}
-
-TEST(ModelWarnings, AnAccuracyIsWarnedOfOnlyWhereItWasMissed) {
-  ModalModel model = ModelWith({200}, {0.02});
-  WarnOfAccuracy({.accuracy = 0.02}, model);
-  WarnOfAccuracy({.budget_s = 1}, model);
-  EXPECT_THAT(model.warnings, IsEmpty());
-  WarnOfAccuracy({.accuracy = 0.01}, model);
-  EXPECT_EQ(model.warnings.size(), 1U);
 }
 
 }  // namespace

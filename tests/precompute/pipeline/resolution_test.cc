@@ -9,8 +9,6 @@
 namespace carillon::precompute {
 namespace {
 
-using ::testing::StartsWith;
-
 /// A round with the given element size.
 Round Solved(double element_size_mm, double worst_error) {
   return {.element_size_m = 1e-3 * element_size_mm,
@@ -49,10 +47,6 @@ TEST(Resolution, RefinesWallsFurtherThanSolidsInAStep) {
   EXPECT_LT(*wall, *inside);
 }
 
-TEST(Resolution, EndsWhereTheMeshCannotBeRefined) {
-  EXPECT_FALSE(NextElementSize({.accuracy = 0.01}, {Solved(4, 0.02), Solved(4, 0.02)}));
-}
-
 TEST(Resolution, GivesAGradedMeshTheSizeOfTheUniformOneAndTellsWhetherItIsFiner) {
   std::vector<Round> rounds{Solved(4, 0.02), Solved(1, 0.012)};
   EXPECT_TRUE(SetEquivalentSize(3e-3, rounds));
@@ -70,37 +64,6 @@ TEST(Resolution, KeepsToItsBudgets) {
   const auto next = NextElementSize({.budget_s = 60}, {Solved(4, 0.5)});
   ASSERT_TRUE(next);
   EXPECT_LT(*next, 4e-3 / 1.4);
-}
-
-TEST(Resolution, ABudgetThatWasOverrunIsSaidWithWhatWasUsed) {
-  const double gib = 1024.0 * 1024 * 1024;
-  const ResolutionGoal goal{.budget_s = 10, .budget_bytes = 2 * gib};
-  EXPECT_TRUE(OverrunWarnings(goal, 9.9, 1.9 * gib).empty());
-  const auto slow = OverrunWarnings(goal, 12.5, 1.9 * gib);
-  ASSERT_EQ(slow.size(), 1U);
-  EXPECT_THAT(slow[0], StartsWith("the budget of 10 s of processor time was overrun: 12.5 were"));
-  const auto large = OverrunWarnings(goal, 9.9, 2.25 * gib);
-  ASSERT_EQ(large.size(), 1U);
-  EXPECT_THAT(large[0], StartsWith("the budget of 2 GiB of memory was overrun: 2.25 were used"));
-  EXPECT_EQ(OverrunWarnings(goal, 12.5, 2.25 * gib).size(), 2U);
-  EXPECT_TRUE(OverrunWarnings({.accuracy = 0.01}, 1e9, 1e15).empty());
-}
-
-TEST(Resolution, EndsAfterSomeRounds) {
-  std::vector<Round> rounds;
-  for (const double element_size_mm : {32, 16, 8, 4, 2})
-    rounds.push_back(Solved(element_size_mm, 0.5));
-  EXPECT_TRUE(NextElementSize({.accuracy = 1e-9}, rounds));
-  rounds.push_back(Solved(1, 0.5));
-  EXPECT_FALSE(NextElementSize({.accuracy = 1e-9}, rounds));
-}
-
-TEST(TimeGrowth, IsThatOfTheNodesAndMore) {
-  const Round wall{.element_size_m = 0.002, .thin = true};
-  EXPECT_DOUBLE_EQ(TimeGrowth(wall, 0.002), 1);
-  // Half the element size: four times the nodes of a wall, eight times those of a solid.
-  EXPECT_GT(TimeGrowth(wall, 0.001), 4);
-  EXPECT_GT(TimeGrowth({.element_size_m = 0.002, .thin = false}, 0.001), 8);
 }
 
 }  // namespace

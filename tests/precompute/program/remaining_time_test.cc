@@ -29,14 +29,6 @@ void RunAll(RemainingTime& remaining, double begun_s, double slowness, Look look
   }
 }
 
-TEST(RemainingTime, IsNotKnownBeforeThereIsAPlan) {
-  RemainingTime remaining;
-  EXPECT_FALSE(remaining.Seconds(0).has_value());
-  remaining.BeginRound(1, {});
-  remaining.Progress(2, v1::PHASE_MESH, 0);
-  EXPECT_FALSE(remaining.Seconds(3).has_value());
-}
-
 TEST(RemainingTime, IsThePlanWhereNothingHasBeenMeasured) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
@@ -66,38 +58,6 @@ TEST(RemainingTime, FallsFromPhaseToPhase) {
   EXPECT_DOUBLE_EQ(before, 0);
 }
 
-TEST(RemainingTime, FallsBySecondsWithinAPhaseThatReportsNothing) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {});
-  remaining.Plan(0, kSteps);
-  remaining.Progress(0, v1::PHASE_VERIFY, 0);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(4).value(), 116);
-  // It takes longer than foreseen: never over before its end.
-  EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.5);
-}
-
-TEST(RemainingTime, WhatIsReportedWithinAPhaseCorrectsItAtOnce) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {});
-  remaining.Plan(0, kSteps);
-  remaining.Progress(0, v1::PHASE_VERIFY, 0);
-  remaining.Progress(15, v1::PHASE_VERIFY, 0.5);
-  // Three times as slow as predicted: 345 s are left.
-  EXPECT_NEAR(remaining.Seconds(15).value(), 345, 0.02 * 345);
-}
-
-TEST(RemainingTime, FallsBySecondsAfterTheLastReportOfAPhase) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {});
-  remaining.Plan(0, kSteps);
-  remaining.Progress(0, v1::PHASE_VERIFY, 0);
-  remaining.Progress(5, v1::PHASE_VERIFY, 0.5);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(5).value(), 115);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(8).value(), 112);
-  // Silence is no news of the machine's speed.
-  EXPECT_DOUBLE_EQ(remaining.Seconds(50).value(), 110.25);
-}
-
 TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
   RemainingTime remaining;
   remaining.BeginRound(0, {});
@@ -109,40 +69,6 @@ TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
   remaining.Plan(20, more);
   remaining.Progress(20, v1::PHASE_FACTOR, 0);
   EXPECT_NEAR(remaining.Seconds(20).value(), 2 * (5 + 400 + 5 + 20), 5);
-}
-
-TEST(RemainingTime, CountsTheRoundsThatAreToFollow) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {.later_rounds = 3});
-  RunAll(remaining, 0, 1, [&](double now_s, double left_s) {
-    EXPECT_NEAR(remaining.Seconds(now_s).value(), left_s + 3 * 120, 1e-6);
-  });
-  remaining.BeginRound(120, {.expected_s = 300});
-  EXPECT_DOUBLE_EQ(remaining.Seconds(120).value(), 300);
-  remaining.Progress(130, v1::PHASE_MESH, 0);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(140).value(), 280);
-}
-
-TEST(RemainingTime, TheRoundBeforeTellsMoreThanThePlanUntilTheModesAreCounted) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {.expected_s = 300});
-  remaining.Plan(10, kSteps);
-  remaining.Progress(10, v1::PHASE_VERIFY, 0);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(10).value(), 290);
-  remaining.Progress(20, v1::PHASE_FACTOR, 0);
-  EXPECT_DOUBLE_EQ(remaining.Seconds(20).value(), 110);
-}
-
-TEST(RemainingTime, StepsOfASecondAttemptCountAgain) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {});
-  remaining.Plan(0, kSteps);
-  remaining.Progress(0, v1::PHASE_VERIFY, 0);
-  remaining.Progress(10, v1::PHASE_FACTOR, 0);
-  remaining.Progress(15, v1::PHASE_SOLVE, 0);
-  remaining.Progress(95, v1::PHASE_VERIFY, 0);
-  remaining.Progress(105, v1::PHASE_FACTOR, 0);
-  EXPECT_NEAR(remaining.Seconds(105).value(), 110, 8);
 }
 
 }  // namespace

@@ -259,22 +259,6 @@ TEST_F(AudioApi, AListenerHearsWhatTheMixerRenders) {
   EXPECT_LT(error, 1e-5F * peak + asleep);
 }
 
-TEST_F(AudioApi, TheNumberOfListenersIsLimited) {
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<std::unique_ptr<grpc::ClientReader<v1::ListenResponse>>> readers;
-  v1::ListenResponse response;
-  for (size_t i = 0; i < BlockBroadcast::kMaxListenerCount; ++i) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    readers.push_back(audio->Listen(contexts.back().get(), {}));
-    ASSERT_TRUE(readers.back()->Read(&response));
-  }
-  grpc::ClientContext context;
-  const auto refused = audio->Listen(&context, {});
-  EXPECT_FALSE(refused->Read(&response));
-  ExpectRefused(refused->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_CALLS");
-  for (const auto& one : contexts) one->TryCancel();
-}
-
 TEST_F(AudioApi, WhatIsNoTraceIsRefused) {
   const Requests good = Trace();
   const auto expect = [&](const Requests& requests) {
@@ -315,58 +299,6 @@ TEST_F(AudioApi, ATraceThatWasHeardLiveBeginsAtItsFirstStep) {
     if (sound.empty()) sound = rendering.sound;
     EXPECT_EQ(rendering.sound, sound);
   }
-}
-
-TEST_F(AudioApi, AClockThatNoDaemonCanHaveHadIsRefused) {
-  const auto expect = [&](const std::function<void(v1::ContactTraceClock&)>& spoil) {
-    Requests requests = Trace();
-    spoil(*requests[1].mutable_record()->mutable_header()->mutable_clock());
-    ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "TRACE_MALFORMED");
-  };
-  expect([](auto& clock) { clock.set_first_frame(100); });
-  expect([](auto& clock) { clock.set_first_frame(uint64_t{1} << 60); });
-  expect([](auto& clock) { clock.set_first_time_s(-1.1e10); });
-  expect([](auto& clock) { clock.set_first_time_s(-86400); });  // the step is over a day later
-  expect([](auto& clock) { clock.set_first_time_s(0.6); });     // after the first step
-  expect([](auto& clock) { clock.set_scheduling_delay_s(std::nan("")); });
-  expect([](auto& clock) { clock.set_stagger(16); });
-}
-
-TEST_F(AudioApi, SettingsAndObjectsThatCannotBeAreRefusedWithTheirReasons) {
-  const Requests good = Trace();
-  Requests requests = good;
-  requests[0].mutable_settings()->set_sample_rate_hz(1);
-  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-  requests = good;
-  v1::ContactTraceObject& object = *requests[2].mutable_record()->mutable_object();
-  object.set_modal_model(std::string("modalModels/").append(64, '0'));
-  ExpectRefused(Render(requests).status, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
-  object = good[2].record().object();
-  object.mutable_material()->set_poisson_ratio(0.1);
-  ExpectRefused(Render(requests).status, grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");
-  requests = good;
-  requests.insert(requests.begin() + 2, good[2]);
-  ExpectRefused(Render(requests).status, grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
-  requests = good;
-  requests[0].mutable_settings()->set_channel_count(3);
-  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-  requests = good;
-  requests[1].mutable_record()->mutable_header()->mutable_hearing()->set_reference_distance_m(-1);
-  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-  requests = good;
-  requests[2].mutable_record()->mutable_object()->mutable_pose()->mutable_orientation()->set_w(2);
-  ExpectRefused(Render(requests).status, grpc::INVALID_ARGUMENT, "INVALID_POSE");
-}
-
-TEST_F(AudioApi, ImpulsesThatCannotBeUsedAreCountedAndTheRestIsRendered) {
-  Requests requests = Trace();
-  *requests[3].mutable_record()->mutable_step()->add_contacts() = Strike(2);
-  const Rendering rendering = Render(requests);
-  ASSERT_TRUE(rendering.status.ok());
-  EXPECT_EQ(rendering.summary.accepted_count(), 1U);
-  EXPECT_EQ(rendering.summary.rejected_count(), 1U);
-  EXPECT_EQ(rendering.summary.last_rejection().reason(), "OBJECT_NOT_FOUND");
-  EXPECT_FALSE(Render(Trace()).summary.has_last_rejection());
 }
 
 TEST_F(AudioApi, TheMixerSaysHowItPlays) {

@@ -143,39 +143,6 @@ TEST_F(ClientApi, AnUploadWhoseClientSaysNothingEndsAndStoresNothing) {
   ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
 }
 
-TEST_F(ClientApi, AnUploadThatTricklesEnds) {
-  grpc::ClientContext context;
-  v1::UploadMeshResponse response;
-  const auto call = models->UploadMesh(&context, &response);
-  v1::UploadMeshRequest request;
-  request.set_data("v");
-  while (call->Write(request)) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
-}
-
-TEST_F(ClientApi, OneClientHasAShareOfAllUploadsAndOthersHaveTheirs) {
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<v1::UploadMeshResponse> responses(kMaxUploadCount / 4 + 1);
-  std::vector<std::unique_ptr<grpc::ClientWriter<v1::UploadMeshRequest>>> uploads;
-  for (v1::UploadMeshResponse& response : responses) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    uploads.push_back(models->UploadMesh(contexts.back().get(), &response));
-  }
-  int refused_count = 0;
-  for (const auto& upload : uploads) {
-    refused_count += ErrorOf(upload->Finish()).reason() == "CLIENT_LIMIT_REACHED" ? 1 : 0;
-  }
-  EXPECT_EQ(refused_count, 1);  // the others end as idle and give their places back
-  v1::UploadMeshResponse response;
-  grpc::ClientContext context;
-  const auto upload = models->UploadMesh(&context, &response);
-  v1::UploadMeshRequest request;
-  request.set_data("mesh");
-  upload->Write(request);
-  upload->WritesDone();
-  EXPECT_TRUE(upload->Finish().ok());
-}
-
 TEST_F(ClientApi, ExportsThatNobodyReadAreBoundedAndEnd) {
   // gRPC takes some of a model from the daemon before the client reads, but not megabytes.
   const std::string model = ImportModel(SampleModel(300, 4000));
@@ -217,29 +184,6 @@ TEST_F(ClientApi, ACompressedMessageIsRefusedBeforeItIsUnpacked) {
   upload->Write(request);
   upload->WritesDone();
   EXPECT_EQ(upload->Finish().error_code(), grpc::UNIMPLEMENTED);
-}
-
-TEST_F(ClientApi, RenderingsThatSayNothingLeaveRoomForOthers) {
-  const auto silent = Connect(address());
-  const auto stub = v1::AudioService::NewStub(silent);
-  std::vector<
-      std::pair<std::unique_ptr<grpc::ClientContext>,
-                std::unique_ptr<grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>>>>
-      calls;
-  for (int i = 0; i < 3; ++i) {
-    auto context = std::make_unique<grpc::ClientContext>();
-    auto call = stub->Render(context.get());
-    calls.emplace_back(std::move(context), std::move(call));
-  }
-  std::vector<std::string> reasons;
-  for (auto& [context, call] : calls) {
-    v1::RenderResponse response;
-    while (call->Read(&response)) {
-    }
-    reasons.push_back(ErrorOf(call->Finish()).reason());
-  }
-  EXPECT_THAT(reasons,
-              testing::UnorderedElementsAre("CLIENT_IDLE", "CLIENT_IDLE", "CLIENT_LIMIT_REACHED"));
 }
 
 }  // namespace

@@ -56,45 +56,11 @@ TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
   EXPECT_EQ(answer.rejected_count(), 10U * 5001);
 }
 
-TEST_F(LoadApi, ATraceWithMoreObjectsThanADaemonMaySoundIsRefused) {
-  grpc::ClientContext context;
-  const auto stream = BeginTrace(context);
-  v1::RenderRequest request;
-  v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
-  object.set_modal_model(ImportSmallModel());
-  *object.mutable_material() = SmallMaterial();
-  for (uint32_t handle = 1; handle <= SceneRegistry::kMaxObjectCount + 1; ++handle) {
-    object.set_handle(handle);
-    if (!stream->Write(request)) break;
-  }
-  v1::RenderResponse response;
-  EXPECT_FALSE(stream->Read(&response));
-  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "TOO_MANY_OBJECTS");
-}
-
 /// A daemon of whose memory for renderings one client has very little.
 class LittleMemoryApi : public LoadApi {
  protected:
   LittleMemoryApi() : LoadApi({.client_share = 0.001}) {}
 };
-
-TEST_F(LittleMemoryApi, ATraceWhoseObjectsTakeMoreThanTheClientsShareIsRefused) {
-  grpc::ClientContext context;
-  const auto stream = BeginTrace(context);
-  v1::RenderRequest request;
-  v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
-  object.set_modal_model(ImportSmallModel());
-  *object.mutable_material() = SmallMaterial();
-  for (uint32_t handle = 1; handle <= 100; ++handle) {
-    object.set_handle(handle);
-    if (!stream->Write(request)) break;
-  }
-  v1::RenderResponse response;
-  EXPECT_FALSE(stream->Read(&response));
-  ExpectRefused(stream->Finish(), grpc::RESOURCE_EXHAUSTED, "CLIENT_LIMIT_REACHED");
-  while (server().clients().renderings > 0) {
-  }
-}
 
 /// The events of this trace would take 200 MiB. A thread sends them, because the daemon reads on
 /// only when the sound so far has been read.

@@ -97,12 +97,6 @@ TEST_F(ModelApi, AMeshIsStoredUnderTheDigestOfItsBytes) {
   EXPECT_EQ(response.byte_count(), 3U);
 }
 
-TEST_F(ModelApi, AnEmptyMeshIsRefused) {
-  v1::UploadMeshResponse response;
-  ExpectRefused(Upload({}, response), grpc::INVALID_ARGUMENT, "MESH_EMPTY");
-  ExpectRefused(Upload({""}, response), grpc::INVALID_ARGUMENT, "MESH_EMPTY");
-}
-
 TEST_F(ModelApi, ARequestThatCannotBeComputedIsRefused) {
   const v1::CreateModalModelRequest good = RequestFor("mesh");
   v1::Job job;
@@ -264,97 +258,6 @@ TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {
   EXPECT_EQ(count, 6U);
 }
 
-TEST_F(ModelApi, AHeaderThatIsTooLongIsRefusedWithTheLimit) {
-  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
-  records[0].mutable_header()->add_warnings(std::string(1 << 20, 'w'));
-  const grpc::Status status = Import(records);
-  ExpectRefused(status, grpc::RESOURCE_EXHAUSTED, "MODAL_MODEL_TOO_LARGE");
-  EXPECT_THAT(status.error_message(), testing::HasSubstr("1048576"));
-}
-
-TEST_F(ModelApi, TheNumberOfTagsOfAModelIsBounded) {
-  v1::UpdateModalModelRequest request;
-  request.set_name(ImportSmallModel());
-  for (int i = 0; i < 100; ++i) request.add_add_tags("tag" + std::to_string(i));
-  v1::UpdateModalModelResponse response;
-  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
-  ASSERT_TRUE(Call(*models, update, request, response).ok());
-  EXPECT_EQ(response.modal_model().tags_size(), 100);
-  request.clear_add_tags();
-  request.add_add_tags("one-more");
-  ExpectRefused(Call(*models, update, request, response), grpc::RESOURCE_EXHAUSTED,
-                "TOO_MANY_TAGS");
-  request.add_remove_tags("tag1");
-  ASSERT_TRUE(Call(*models, update, request, response).ok());
-  EXPECT_EQ(response.modal_model().tags_size(), 100);
-}
-
-TEST_F(ModelApi, ARefusalThatRepeatsALongNameKeepsItsReason) {
-  v1::GetModalModelRequest request;
-  request.set_name("modalModels/" + std::string(1'900'000, 'x') + "\x1b[31m");
-  v1::GetModalModelResponse response;
-  const grpc::Status status =
-      Call(*models, &v1::ModalModelService::Stub::GetModalModel, request, response);
-  EXPECT_NE(status.error_code(), grpc::RESOURCE_EXHAUSTED);
-  EXPECT_NE(ErrorOf(status).reason(), "");
-  EXPECT_LE(status.error_message().size(), 1024U);
-}
-
-TEST_F(ModelApi, ManyTransfersOfAnImportAreRefused) {
-  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
-  v1::TransferRecord header;
-  *header.mutable_header() = SampleTransferHeader(1, 10);
-  for (int i = 0; i < 65; ++i) {
-    records.emplace_back().set_transfer(header.SerializeAsString());
-  }
-  ExpectRefused(Import(records), grpc::RESOURCE_EXHAUSTED, "MODAL_MODEL_TOO_LARGE");
-}
-
-TEST_F(ModelApi, AModelThatIsNotThereIsNotFound) {
-  const std::string name = std::string("modalModels/").append(64, '0');
-  grpc::ClientContext get_context;
-  v1::GetModalModelRequest get;
-  get.set_name(name);
-  v1::GetModalModelResponse got;
-  ExpectRefused(models->GetModalModel(&get_context, get, &got), grpc::NOT_FOUND,
-                "MODAL_MODEL_NOT_FOUND");
-  grpc::ClientContext delete_context;
-  v1::DeleteModalModelRequest remove;
-  remove.set_name(name);
-  v1::DeleteModalModelResponse removed;
-  ExpectRefused(models->DeleteModalModel(&delete_context, remove, &removed), grpc::NOT_FOUND,
-                "MODAL_MODEL_NOT_FOUND");
-  std::vector<v1::ModalModelRecord> records;
-  ExpectRefused(Export(name, records), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
-}
-
-TEST_F(ModelApi, ADamagedModelIsRefused) {
-  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
-  ExpectRefused(Import({}), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
-  ExpectRefused(Import({records[0]}), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
-  records[1].mutable_chunk()->mutable_data()->front() ^= 1;
-  ExpectRefused(Import(records), grpc::DATA_LOSS, "MODAL_MODEL_CORRUPT");
-}
-
-TEST_F(ModelApi, AModelOrTransferWithAnImpossibleFigureIsRefused) {
-  std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
-  v1::ModalModelHeader& header = *records[0].mutable_header();
-  header.set_volume_m3(-1);
-  ExpectRefused(Import(records), grpc::INVALID_ARGUMENT, "MODAL_MODEL_MALFORMED");
-  header.set_volume_m3(1e-3);
-  const std::vector<v1::ModalModelRecord> alone = records;
-  const std::string bytes = SampleTransferBytes(
-      *SmallModel(), {.power_integrals = std::vector<float>(SmallModel()->mode_count(), 1)});
-  const absl::StatusOr<StoredTransfer> transfer = StoredTransfer::Parse(bytes);
-  ASSERT_TRUE(transfer.ok()) << transfer.status();
-  for (v1::TransferRecord record : transfer->Records()) {
-    if (record.has_header()) record.mutable_header()->set_air_density_kg_per_m3(1e300);
-    records.emplace_back().set_transfer(record.SerializeAsString());
-  }
-  ExpectRefused(Import(records), grpc::INVALID_ARGUMENT, "TRANSFER_MALFORMED");
-  EXPECT_TRUE(Import(alone).ok());
-}
-
 TEST_F(ModelApi, MaterialsAreListed) {
   grpc::ClientContext context;
   v1::ListMaterialsResponse response;
@@ -384,18 +287,6 @@ TEST_F(ModelApi, HealthSaysServing) {
   grpc::Slice bytes;
   ASSERT_TRUE(response.DumpToSingleSlice(&bytes).ok());
   EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "\x08\x01");  // status = SERVING
-}
-
-TEST_F(ModelApi, TextThatIsNotUtf8IsRefusedAndLoggedWithinLimits) {
-  v1::CreateModalModelRequest request;
-  request.mutable_material()->set_preset("\xff");
-  v1::CreateModalModelResponse response;
-  for (int i = 0; i < 100; ++i) {
-    EXPECT_FALSE(
-        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
-  }
-  EXPECT_THAT(log(), testing::HasSubstr("protobuf: String field"));
-  EXPECT_LT(log().size(), 10'000U);
 }
 
 }  // namespace

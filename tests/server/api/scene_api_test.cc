@@ -32,14 +32,6 @@ class SceneApi : public ServedDaemon {
     return stream->Finish();
   }
 
-  grpc::Status Remove(const std::string& name) {
-    grpc::ClientContext context;
-    v1::RemoveObjectRequest request;
-    request.set_name(name);
-    v1::RemoveObjectResponse response;
-    return scenes->RemoveObject(&context, request, &response);
-  }
-
   grpc::Status Update(const v1::UpdateObjectRequest& request, v1::UpdateObjectResponse& response) {
     grpc::ClientContext context;
     return scenes->UpdateObject(&context, request, &response);
@@ -81,21 +73,6 @@ TEST_F(SceneApi, TheListenerOfASceneCanBeMoved) {
   ExpectRefused(update(), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
 }
 
-TEST_F(SceneApi, AnObjectStatesHowItSounds) {
-  const std::string scene = CreateScene();
-  v1::AddObjectsResponse response;
-  ASSERT_TRUE(Add(SmallObject(scene), response).ok());
-  const v1::SoundingObject& object = response.objects(0);
-  EXPECT_EQ(object.name(), scene + "/objects/1");
-  EXPECT_EQ(object.handle(), 1U);
-  EXPECT_EQ(object.size(), 1);
-  EXPECT_EQ(object.gain(), 1);
-  EXPECT_EQ(object.sounding_mode_count(), 3U);
-  EXPECT_NEAR(object.lowest_frequency_hz(), 440, 1e-9);
-  EXPECT_EQ(object.material().poisson_ratio(), 0.33);  // the model's: the material has none
-  EXPECT_FALSE(object.has_complete_to_hz());
-}
-
 TEST_F(SceneApi, AnObjectWithoutAMaterialGetsTheOneOfItsModel) {
   v1::AddObjectsRequest request = SmallObject(CreateScene());
   request.mutable_objects(0)->clear_material();
@@ -114,20 +91,6 @@ TEST_F(SceneApi, AnObjectWithoutAMaterialGetsTheOneOfItsModel) {
                 grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
   request.mutable_objects(0)->set_modal_model("modalModels/" + std::string(64, '0'));
   ExpectRefused(Add(request, response), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
-}
-
-TEST_F(SceneApi, AnUpdateAnswersWithTheObjectAsItIsNow) {
-  v1::AddObjectsResponse added;
-  ASSERT_TRUE(Add(SmallObject(CreateScene()), added).ok());
-  v1::UpdateObjectRequest request;
-  request.set_name(added.objects(0).name());
-  request.set_size(2);
-  request.set_gain(0.5);
-  v1::UpdateObjectResponse response;
-  ASSERT_TRUE(Update(request, response).ok());
-  EXPECT_EQ(response.object().size(), 2);
-  EXPECT_EQ(response.object().gain(), 0.5);
-  EXPECT_NEAR(response.object().lowest_frequency_hz(), 220, 1e-9);
 }
 
 TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
@@ -164,58 +127,6 @@ TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
   request.set_scene("scenes/77");
   ExpectRefused(scenes->ListObjects(&of_none, request, &objects), grpc::NOT_FOUND,
                 "SCENE_NOT_FOUND");
-}
-
-TEST_F(SceneApi, WhatIsNotThereIsNotFound) {
-  const std::string scene = CreateScene();
-  const v1::AddObjectsRequest good = SmallObject(scene);
-  v1::AddObjectsResponse added;
-  v1::AddObjectsRequest request = good;
-  request.set_scene("scenes/77");
-  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
-  request.set_scene("nonsense");
-  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
-  request = good;
-  request.mutable_objects(0)->set_modal_model(std::string("modalModels/").append(64, '0'));
-  ExpectRefused(Add(request, added), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
-  ExpectRefused(Remove(scene + "/objects/5"), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
-  ExpectRefused(Remove(scene), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
-  v1::UpdateObjectRequest update;
-  update.set_name(scene + "/objects/5");
-  v1::UpdateObjectResponse updated;
-  ExpectRefused(Update(update, updated), grpc::NOT_FOUND, "OBJECT_NOT_FOUND");
-  grpc::ClientContext context;
-  v1::DeleteSceneRequest remove;
-  remove.set_name("scenes/77");
-  v1::DeleteSceneResponse removed;
-  ExpectRefused(scenes->DeleteScene(&context, remove, &removed), grpc::NOT_FOUND,
-                "SCENE_NOT_FOUND");
-}
-
-TEST_F(SceneApi, AnObjectThatCannotSoundIsRefusedWithItsReason) {
-  const v1::AddObjectsRequest good = SmallObject(CreateScene());
-  v1::AddObjectsResponse response;
-  v1::AddObjectsRequest request = good;
-  request.mutable_objects(0)->mutable_material()->set_preset("cheese");
-  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
-  request = good;
-  request.mutable_objects(0)->mutable_material()->set_density_kg_per_m3(-1);
-  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_MATERIAL");
-  request = good;
-  request.mutable_objects(0)->set_size(-1);
-  ExpectRefused(Add(request, response), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-  request = good;
-  request.mutable_objects(0)->mutable_material()->set_poisson_ratio(0.2);
-  ExpectRefused(Add(request, response), grpc::FAILED_PRECONDITION, "POISSON_RATIO_DIFFERS");
-  request = good;
-  request.mutable_objects(0)->set_size(0.01);
-  const grpc::Status status = Add(request, response);
-  ExpectRefused(status, grpc::FAILED_PRECONDITION, "NO_MODE_IN_BAND");
-  EXPECT_NEAR(std::stod(ErrorOf(status).metadata().at("first_mode_hz")), 44000, 1);
-  request = good;
-  request.mutable_objects(0)->set_handle(3);
-  ASSERT_TRUE(Add(request, response).ok());
-  ExpectRefused(Add(request, response), grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
 }
 
 TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
@@ -287,26 +198,6 @@ TEST_F(SceneApi, TheFirstAnswerComesBeforeAnyStep) {
   EXPECT_TRUE(stream->Read(&answer));  // once at the end
   EXPECT_FALSE(stream->Read(&answer));
   EXPECT_TRUE(stream->Finish().ok());
-}
-
-TEST_F(SceneApi, AStreamOutOfOrderIsRefused) {
-  const std::string scene = CreateScene();
-  v1::StreamContactsRequest step;
-  step.add_steps()->set_time_s(1);
-  v1::StreamContactsRequest earlier;
-  earlier.add_steps()->set_time_s(0.5);
-  v1::StreamContactsRequest no_step_s = Start(scene);
-  no_step_s.mutable_start()->clear_step_s();
-  v1::StreamContactsResponse last;
-  ExpectRefused(Exchange({step}, last), grpc::INVALID_ARGUMENT, "INVALID_STREAM");
-  ExpectRefused(Exchange({Start("scenes/77")}, last), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
-  ExpectRefused(Exchange({Start(scene), Start(scene)}, last), grpc::INVALID_ARGUMENT,
-                "INVALID_STREAM");
-  ExpectRefused(Exchange({Start(scene), step, earlier}, last), grpc::INVALID_ARGUMENT,
-                "INVALID_STREAM");
-  ExpectRefused(Exchange({no_step_s}, last), grpc::INVALID_ARGUMENT, "INVALID_STREAM");
-  ExpectRefused(Exchange({v1::StreamContactsRequest()}, last), grpc::INVALID_ARGUMENT,
-                "INVALID_STREAM");
 }
 
 TEST_F(SceneApi, ASceneOutlivesAStreamThatWasCutOff) {

@@ -129,32 +129,6 @@ TEST_F(SceneIdApi, AnIdHasTheStatedForm) {
   }
 }
 
-TEST_F(SceneIdApi, NumbersNameOnlyScenesThatTheDaemonHasNumbered) {
-  const std::string numbered = CreateScene();
-  ASSERT_TRUE(Create(Wanted("a")).ok());
-  v1::Scene scene;
-  EXPECT_TRUE(Get(numbered, scene).ok());
-  for (const char* name : {"scenes/2", "scenes/01", "scenes/+1", "scenes/", "scenes/b", "a", ""}) {
-    ExpectRefused(Get(name, scene), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
-  }
-}
-
-TEST_F(SceneIdApi, EqualRequestsAtOnceMakeOneScene) {
-  std::vector<std::thread> threads;
-  std::atomic<int> made = 0;
-  threads.reserve(16);
-  for (int i = 0; i < 16; ++i) {
-    threads.emplace_back([&] {
-      v1::CreateSceneResponse response;
-      EXPECT_TRUE(Call(*scenes, &SceneStub::CreateScene, Wanted("shared"), response).ok());
-      made += response.existing() ? 0 : 1;
-    });
-  }
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(made, 1);
-  EXPECT_EQ(CountScenes(), 1U);
-}
-
 class BriefSceneIdApi : public SceneIdApi {
  protected:
   BriefSceneIdApi() : SceneIdApi({.scene_grace_s = 0.2, .client_share = 1}) {}
@@ -228,12 +202,6 @@ class AddObjectsApi : public SceneIdApi {
     return Call(*scenes, &SceneStub::AddObjects, request, added_);
   }
 
-  std::vector<uint32_t> Handles() {
-    std::vector<uint32_t> handles;
-    for (const v1::SoundingObject& object : added_.objects()) handles.push_back(object.handle());
-    return handles;
-  }
-
   void ExpectRefusedAt(const v1::AddObjectsRequest& request, grpc::StatusCode code,
                        const char* reason, const std::string& index) {
     const grpc::Status status = AddAll(request);
@@ -249,17 +217,6 @@ class AddObjectsApi : public SceneIdApi {
   v1::AddObjectsResponse added_;
 };
 
-TEST_F(AddObjectsApi, FreeHandlesAreThoseThatNoObjectAsksFor) {
-  ASSERT_TRUE(AddAll(Objects({0, 2, 0, 1, 0})).ok());
-  EXPECT_THAT(Handles(), testing::ElementsAre(3, 2, 4, 1, 5));
-  EXPECT_EQ(added_.objects(0).name(), scene_ + "/objects/3");
-  EXPECT_EQ(added_.objects(0).sounding_mode_count(), added_.objects(4).sounding_mode_count());
-  EXPECT_EQ(StrikeLive(scene_).accepted_count(), 1U);
-  ASSERT_TRUE(AddAll(Objects({0, 0})).ok());
-  EXPECT_THAT(Handles(), testing::ElementsAre(6, 7));
-  ASSERT_TRUE(AddAll(Objects({})).ok());
-}
-
 TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
   v1::AddObjectsRequest request = Objects({1, 2, 3, 2});
   ExpectRefusedAt(request, grpc::ALREADY_EXISTS, "OBJECT_EXISTS", "3");
@@ -273,24 +230,6 @@ TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
   request.mutable_objects(0)->mutable_material()->set_preset("unobtainium");
   ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL", "0");
   EXPECT_TRUE(AddAll(Objects({1, 2})).ok());
-}
-
-TEST_F(AddObjectsApi, AloneIsRefusedWithoutAPlace) {
-  v1::AddObjectsRequest request = Objects({1});
-  request.mutable_objects(0)->set_size(-1);
-  const grpc::Status status = AddAll(request);
-  ExpectRefused(status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-  EXPECT_EQ(ErrorOf(status).metadata().count("index"), 0U);
-}
-
-TEST_F(AddObjectsApi, AHandleOfTheSceneIsTaken) {
-  ASSERT_TRUE(AddAll(Objects({7})).ok());
-  const grpc::Status status = AddAll(Objects({0, 7}));
-  ExpectRefused(status, grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
-  EXPECT_EQ(ErrorOf(status).metadata().at("index"), "1");
-  v1::AddObjectsRequest nowhere = Objects({0});
-  nowhere.set_scene("scenes/none");
-  ExpectRefused(AddAll(nowhere), grpc::NOT_FOUND, "SCENE_NOT_FOUND");
 }
 
 TEST_F(AddObjectsApi, TheDaemonIsFilledAndNotOverfilled) {

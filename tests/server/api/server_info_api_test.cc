@@ -71,15 +71,6 @@ TEST_F(ServerInfoApi, AMessageOfTheLargestSizeIsReadAndOneByteMoreIsNot) {
   }
 }
 
-TEST_F(ServerInfoApi, FeaturesAreWordsInAlphabeticalOrder) {
-  const v1::GetServerInfoResponse answer = InfoFrom(*info);
-  const std::vector<std::string> features(answer.features().begin(), answer.features().end());
-  EXPECT_THAT(features, testing::Contains("decomposition"));
-  EXPECT_THAT(features, testing::Not(testing::Contains("slurm")));
-  EXPECT_THAT(features, testing::Not(testing::Contains("transfers")));
-  EXPECT_TRUE(std::ranges::is_sorted(features));
-}
-
 /// A daemon whose decompositions run on a cluster.
 class ClusterInfoApi : public ServedDaemon {
  protected:
@@ -104,15 +95,6 @@ class GuardedInfoApi : public ServedDaemon {
     return path;
   }
 };
-
-TEST_F(GuardedInfoApi, NeedsNoToken) {
-  const auto channel = grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials());
-  v1::GetMixerResponse mixer;
-  const auto guarded = v1::AudioService::NewStub(channel);
-  ExpectRefused(Call(*guarded, &v1::AudioService::Stub::GetMixer, {}, mixer), grpc::UNAUTHENTICATED,
-                "CREDENTIAL_MISSING");
-  EXPECT_EQ(InfoFrom(*v1::ServerService::NewStub(channel)).version(), "test");
-}
 
 }  // namespace
 }  // namespace carillon

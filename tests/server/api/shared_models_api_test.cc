@@ -40,15 +40,6 @@ class SharedModelsApi : public ServedDaemon {
     return SampleRecords(other);
   }
 
-  static std::vector<v1::ModalModelRecord> WithTransfer(std::vector<v1::ModalModelRecord> records) {
-    const std::vector<float> integrals(SmallModel()->mode_count(), 1);
-    for (const v1::TransferRecord& record :
-         SampleTransfer(*SmallModel(), {.power_integrals = integrals}).Records()) {
-      records.emplace_back().set_transfer(record.SerializeAsString());
-    }
-    return records;
-  }
-
   /// A request for a model, whose mesh is stored.
   v1::CreateModalModelRequest RequestWithMesh() {
     grpc::ClientContext context;
@@ -91,17 +82,6 @@ TEST_F(SharedModelsApi, AClientCannotReplaceTheModelOfOthers) {
   EXPECT_TRUE(Import(*neighbours_, "", OtherRecords()).ok()) << "under a name of its own";
 }
 
-TEST_F(SharedModelsApi, AClientCannotGiveTheModelOfOthersATransfer) {
-  const std::string name = ImportSmallModel();
-  const auto records = WithTransfer(SampleRecords(*SmallModel()));
-  ExpectRefused(Import(*neighbours_, name, records), grpc::ALREADY_EXISTS, "MODAL_MODEL_EXISTS");
-  EXPECT_EQ(Get(name).transfers_size(), 0);
-  EXPECT_TRUE(Import(*neighbours_, "", WithTransfer(SampleRecords(*SmallModel()))).ok())
-      << "a model of its own brings its transfers";
-  EXPECT_TRUE(Import(*models, name, records).ok()) << "by a caller that may administer";
-  EXPECT_EQ(Get(name).transfers_size(), 1);
-}
-
 TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
   const std::string name = ImportSmallModel();
   v1::UpdateModalModelRequest pin;
@@ -116,47 +96,6 @@ TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
   const int64_t revision = response.modal_model().revision();
   EXPECT_TRUE(Import(*models, name, OtherRecords()).ok());
   EXPECT_GT(Get(name).revision(), revision);
-}
-
-TEST_F(SharedModelsApi, AMaterialWithWhichTheModelCannotSoundIsRefused) {
-  const std::string scene = CreateScene();
-  v1::AddObjectsRequest object = SmallObject(scene);
-  v1::UpdateModalModelRequest request;
-  request.set_name(object.objects(0).modal_model());
-  *request.mutable_material() = object.objects(0).material();
-  object.mutable_objects(0)->clear_material();
-  v1::UpdateModalModelResponse response;
-  const auto update = &v1::ModalModelService::Stub::UpdateModalModel;
-  ASSERT_TRUE(Call(*neighbours_, update, request, response).ok());
-  v1::AddObjectsResponse added;
-  ASSERT_TRUE(Add(object, added).ok());
-
-  request.mutable_material()->set_poisson_ratio(SmallModel()->poisson_ratio + 0.1);
-  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
-                "POISSON_RATIO_DIFFERS");
-  request.mutable_material()->clear_poisson_ratio();
-  request.mutable_material()->set_young_pa(5e-324);
-  request.mutable_material()->set_density_kg_per_m3(1e300);
-  ExpectRefused(Call(*neighbours_, update, request, response), grpc::FAILED_PRECONDITION,
-                "NO_MODE_IN_BAND");
-  EXPECT_TRUE(Add(object, added).ok()) << "it has the material from before";
-}
-
-TEST_F(SharedModelsApi, ARequestDoesNotTakeAwayAMaterialWithWhichTheModelSounds) {
-  v1::CreateModalModelRequest request = RequestWithMesh();
-  const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
-  ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
-  v1::CreateModalModelResponse response;
-  const auto create = &v1::ModalModelService::Stub::CreateModalModel;
-  ASSERT_TRUE(Call(*models, create, request, response).ok());
-  const double young_pa = SmallMaterial().young_pa();
-  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
-  request.mutable_material()->set_young_pa(1e30 * young_pa);
-  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
-  EXPECT_EQ(Get(name).material().young_pa(), young_pa);
-  request.mutable_material()->set_young_pa(1.1 * young_pa);
-  ASSERT_TRUE(Call(*neighbours_, create, request, response).ok());
-  EXPECT_EQ(Get(name).material().young_pa(), 1.1 * young_pa);
 }
 
 TEST_F(SharedModelsApi, ARequestDoesNotChangeAPinnedModelOfOthers) {

@@ -139,54 +139,6 @@ TEST_F(VolumeApi, ASceneTellsItsVolume) {
   EXPECT_TRUE(changed.muted() && changed.solo());
 }
 
-TEST_F(VolumeApi, GainsOutOfRangeAreRefused) {
-  const std::string scene = CreateScene();
-  for (const double gain : {-0.1, 1000.1, std::numeric_limits<double>::quiet_NaN(),
-                            std::numeric_limits<double>::infinity()}) {
-    v1::UpdateSceneRequest change;
-    change.set_name(scene);
-    change.set_gain(gain);
-    v1::UpdateSceneResponse changed;
-    ExpectRefused(Call(*scenes, &v1::SceneService::Stub::UpdateScene, change, changed), kInvalid,
-                  "INVALID_SETTINGS");
-    v1::CreateSceneRequest create;
-    create.set_gain(gain);
-    v1::CreateSceneResponse created;
-    ExpectRefused(Call(*scenes, &v1::SceneService::Stub::CreateScene, create, created), kInvalid,
-                  "INVALID_SETTINGS");
-    v1::UpdateMixerRequest mixer;
-    mixer.set_gain(gain);
-    v1::UpdateMixerResponse mixed;
-    ExpectRefused(Call(*audio, &v1::AudioService::Stub::UpdateMixer, mixer, mixed), kInvalid,
-                  "INVALID_SETTINGS");
-  }
-}
-
-TEST_F(VolumeApi, TheMixerTellsTheVolumeOfTheOutput) {
-  v1::UpdateMixerRequest request;
-  request.set_gain(0.5);
-  v1::UpdateMixerResponse response;
-  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::UpdateMixer, request, response).ok());
-  request.Clear();
-  request.set_muted(true);
-  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::UpdateMixer, request, response).ok());
-  EXPECT_EQ(response.gain(), 0.5);
-  EXPECT_TRUE(response.muted());
-  v1::GetMixerResponse mixer;
-  ASSERT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
-  EXPECT_EQ(mixer.gain(), 0.5);
-  EXPECT_TRUE(mixer.muted());
-}
-
-TEST_F(VolumeApi, AStopEndsWhatRings) {
-  v1::StopAllResponse stopped = StrikeAndStop(SceneWithObject());
-  EXPECT_EQ(stopped.scene_count(), 1U);
-  v1::StopAllRequest request;
-  request.set_scene("scenes/999");
-  ExpectRefused(Call(*scenes, &v1::SceneService::Stub::StopAll, request, stopped),
-                grpc::StatusCode::NOT_FOUND, "SCENE_NOT_FOUND");
-}
-
 TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSamples) {
   const std::string other = SceneWithObject(), scene = SceneWithObject();
   v1::UpdateSceneRequest change;
@@ -233,23 +185,6 @@ TEST_F(VolumeApi, BlocksHaveTheSizeAndTheEncodingAskedFor) {
   grpc::ClientContext refused;
   request.set_block_frame_count(65537);
   ExpectRefused(audio->Listen(&refused, request)->Finish(), kInvalid, "INVALID_SETTINGS");
-}
-
-TEST_F(VolumeApi, AStemEndsWithItsScene) {
-  const std::string scene = CreateScene();
-  grpc::ClientContext context;
-  v1::ListenRequest request;
-  request.set_scene(scene);
-  const auto reader = audio->Listen(&context, request);
-  v1::ListenResponse response;
-  ASSERT_TRUE(reader->Read(&response));
-  v1::DeleteSceneRequest removal;
-  removal.set_name(scene);
-  v1::DeleteSceneResponse removed;
-  ASSERT_TRUE(Call(*scenes, &v1::SceneService::Stub::DeleteScene, removal, removed).ok());
-  while (reader->Read(&response)) {
-  }
-  EXPECT_TRUE(reader->Finish().ok());
 }
 
 TEST_F(VolumeApi, AWatcherSeesEachBlowAndTheReportsOfTheStreamsOfItsScene) {

@@ -76,14 +76,6 @@ class WatchJobsApi : public ServedDaemon {
     return names;
   }
 
-  std::vector<std::string> ListLabels(const v1::ListJobsRequest& request) {
-    v1::ListJobsResponse response;
-    EXPECT_TRUE(Call(*jobs, &v1::DecompositionService::Stub::ListJobs, request, response).ok());
-    std::vector<std::string> labels;
-    for (const v1::Job& job : response.jobs()) labels.push_back(job.label());
-    return labels;
-  }
-
   grpc::ClientContext context_;
 };
 
@@ -126,22 +118,6 @@ TEST_F(WatchJobsApi, SendsOnlyWhatMatches) {
   EXPECT_THAT(labels, testing::Not(Contains("bowl")));
 }
 
-TEST_F(WatchJobsApi, ManyWatchersThatLeaveInTheMidstDisturbNobody) {
-  for (int i = 0; i < 20; ++i) {
-    grpc::ClientContext context;
-    Reader reader = jobs->WatchJobs(&context, {});
-    Submit("job " + std::to_string(i));
-    v1::WatchJobsResponse response;
-    EXPECT_TRUE(reader->Read(&response));
-    context.TryCancel();
-    reader->Finish();
-  }
-  Reader reader = jobs->WatchJobs(&context_, {});
-  ReadBegin(reader);
-  const std::string name = Submit("last");
-  EXPECT_EQ(ReadToEndOf(name, reader).back().name(), name);
-}
-
 TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   constexpr uint32_t kMostWaiting = 4096;
   // The messages that the reader does not read fill the connection's window, which does not grow
@@ -166,23 +142,6 @@ TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   ReadBegin(another);
   const std::string name = Submit("last");
   EXPECT_EQ(ReadToEndOf(name, another).back().name(), name);
-}
-
-TEST_F(WatchJobsApi, ListsHaveTheSameFilter) {
-  Reader reader = jobs->WatchJobs(&context_, {});
-  ReadBegin(reader);
-  for (const char* label : {"bell", "Bell two", "bowl"}) ReadToEndOf(Submit(label), reader);
-  v1::ListJobsRequest request;
-  EXPECT_THAT(ListLabels(request), ElementsAre("bowl", "Bell two", "bell"));
-  request.set_label_contains("BELL");
-  EXPECT_THAT(ListLabels(request), ElementsAre("Bell two", "bell"));
-  request.add_states(v1::JOB_STATE_FAILED);
-  request.add_states(v1::JOB_STATE_RUNNING);
-  request.set_page_size(1);
-  EXPECT_THAT(ListLabels(request), ElementsAre("Bell two"));
-  request.clear_states();
-  request.add_states(v1::JOB_STATE_SUCCEEDED);
-  EXPECT_THAT(ListLabels(request), ElementsAre());
 }
 
 }  // namespace

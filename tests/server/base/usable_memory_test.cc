@@ -53,23 +53,11 @@ TEST_F(UsableMemory, IsTheLeastLimitOfAllGroupsAbove) {
   EXPECT_EQ(Bytes(), 300 * kMib);
 }
 
-TEST_F(UsableMemory, IsTheLimitOfTheRootInAContainerThatSeesThePathOutside) {
-  Write("cgroup", "0::/machine/container/12ab");
-  Write("fs/memory.max", std::to_string(200 * kMib));
-  EXPECT_EQ(Bytes(), 200 * kMib);
-}
-
 TEST_F(UsableMemory, IsTheLimitOfTheGroupInVersion1) {
   Write("cgroup", "9:name=systemd:/\n4:cpu,memory:/docker/12ab\n0::/");
   Write("fs/memory/memory.limit_in_bytes", "9223372036854771712");
   Write("fs/memory/docker/12ab/memory.limit_in_bytes", std::to_string(250 * kMib));
   EXPECT_EQ(Bytes(), 250 * kMib);
-}
-
-TEST_F(UsableMemory, IsTheMachinesIfTheLimitIsLarger) {
-  Write("cgroup", "0::/daemon");
-  Write("fs/daemon/memory.max", std::to_string(2 * machine_));
-  EXPECT_EQ(Bytes(), machine_);
 }
 
 }  // namespace

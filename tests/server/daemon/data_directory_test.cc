@@ -49,27 +49,6 @@ TEST(DataDirectory, IsHeldByOneAtATime) {
   EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
 }
 
-TEST(DataDirectory, IsHeldAlsoAfterItsLockFileWasRemovedOrReplaced) {
-  const TemporaryFolder folder;
-  const absl::StatusOr<DataDirectory> first = DataDirectory::Open(folder / "data");
-  ASSERT_TRUE(first.ok());
-  std::filesystem::remove(folder / "data/lock");
-  for (int time = 0; time < 2; ++time) {  // the first refused daemon makes the file anew
-    EXPECT_THAT(DataDirectory::Open(folder / "data").status().ToString(),
-                testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
-  }
-}
-
-TEST(DataDirectory, IsRefusedIfAnotherVersionHasLockedTheFileOnly) {
-  const TemporaryFolder folder;
-  ASSERT_TRUE(DataDirectory::Open(folder / "data").ok());
-  const int lock = open((folder / "data/lock").c_str(), O_RDWR | O_CLOEXEC);
-  ASSERT_EQ(flock(lock, LOCK_EX | LOCK_NB), 0);
-  EXPECT_THAT(DataDirectory::Open(folder / "data").status().ToString(),
-              testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
-  close(lock);
-}
-
 TEST(DataDirectory, WaitsForOneThatIsBeingGivenUp) {
   const TemporaryFolder folder;
   // In most rounds the other thread tries while the first still has the folder.
@@ -86,13 +65,6 @@ TEST(DataDirectory, WaitsForOneThatIsBeingGivenUp) {
     first.reset();
     other.join();
   }
-}
-
-TEST(DataDirectory, RefusesAFileInItsPlace) {
-  const TemporaryFolder folder;
-  WriteBytes(folder / "file", "");
-  EXPECT_THAT(DataDirectory::Open(folder / "file").status().ToString(),
-              testing::HasSubstr("DATA_DIRECTORY_UNUSABLE: "));
 }
 
 }  // namespace

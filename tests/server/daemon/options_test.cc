@@ -132,36 +132,9 @@ TEST_F(OptionsFile, MetricsHaveOneAddress) {
                 "--listen and --metrics both name 127.0.0.1:1");
 }
 
-TEST(Options, AFlagOutOfRangeIsNamedAsItIsWritten) {
-  EXPECT_THAT(Read({"--sample-rate", "1"}).status().ToString(),
-              HasSubstr("INVALID_CONFIGURATION: --sample-rate: \"1\" must be a number from 8000"));
-  EXPECT_THAT(Read({"--scene-grace", "nan"}).status().ToString(),
-              HasSubstr("--scene-grace: \"nan\" must be"));
-}
-
-TEST(Options, AWordIsNoNumberOnTheCommandLine) {
-  for (const char* flag : {"--workers", "--sample-rate", "--client-share"}) {
-    EXPECT_THAT(Read({flag, "true"}).status().ToString(),
-                testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr(flag)));
-  }
-}
-
 TEST(Options, AFileThatIsNotThereIsRefused) {
   EXPECT_THAT(Read({"--config", "/nonexistent.toml"}).status().ToString(),
               HasSubstr("INVALID_CONFIGURATION: /nonexistent.toml: "));
-}
-
-TEST(Options, AFolderIsNoConfiguration) {
-  EXPECT_THAT(Read({"--config", "/"}).status().ToString(),
-              HasSubstr("INVALID_CONFIGURATION: /: it is no regular file"));
-}
-
-TEST_F(OptionsFile, ANamedPipeIsNoConfiguration) {
-  const char* const file = Write("");
-  std::filesystem::remove(file);
-  ASSERT_EQ(mkfifo(file, 0600), 0);
-  EXPECT_THAT(Read({"--config", file}).status().ToString(),
-              HasSubstr(std::string(file) + ": it is no regular file; name a TOML file"));
 }
 
 TEST_F(OptionsFile, NamesTheSettingsThatDiffer) {
@@ -170,12 +143,6 @@ TEST_F(OptionsFile, NamesTheSettingsThatDiffer) {
       Read({"--config", Write("client_share = 0.25\nlisten = [\"unix:a\"]\n")})->options;
   EXPECT_THAT(DifferentSettings(first, second), ElementsAre("listen", "client_share", "workers"));
   EXPECT_THAT(DifferentSettings(first, first), IsEmpty());
-}
-
-TEST_F(OptionsFile, TheLogLevelIsInfoUnlessAnotherIsNamed) {
-  EXPECT_EQ(Read({})->options.log_level, "info");
-  EXPECT_EQ(Read({"--config", Write("log_level = \"debug\"\n")})->options.log_level, "debug");
-  EXPECT_EQ(Read({"--log-level", "error"})->options.log_level, "error");
 }
 
 TEST_F(OptionsFile, CheckConfigReadsTheFileAndSaysSo) {

@@ -98,19 +98,6 @@ TEST_F(ActiveJobsTest, TheYoungestTransfersYieldTheMemoryForADecomposition) {
   EXPECT_THAT(Start(), ElementsAre("a"));
 }
 
-TEST_F(ActiveJobsTest, TransfersYieldOnlyWhereThatSufficesAndTakeNoMemoryThatIsWaitedFor) {
-  MakeJobs({.worker_count = 3, .memory_budget_bytes = 100, .transfers_yield = true});
-  AddModel("a", 60);
-  AddTransfer("s", 10);
-  EXPECT_THAT(Start(), ElementsAre("a", "s"));
-  AddModel("b", 50);
-  AddTransfer("t", 10);
-  EXPECT_THAT(jobs_->BeginYielding(), IsEmpty());
-  EXPECT_THAT(Start(), IsEmpty());
-  EXPECT_EQ(WaitOf("t").cause(), v1::WAIT_CAUSE_MEMORY);
-  EXPECT_EQ(WaitOf("b").running_job_count(), 2U);
-}
-
 TEST_F(ActiveJobsTest, TellsWhatAJobWaitsFor) {
   MakeJobs({.worker_count = 1, .memory_budget_bytes = 100, .transfers_yield = true});
   AddModel("a");

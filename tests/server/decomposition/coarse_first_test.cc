@@ -162,18 +162,6 @@ TEST_F(CoarseFirstTest, TheCoarseModelHasItsOwnNameAndIsNotComputedTwice) {
   EXPECT_EQ(Runs(), "coarse\nfine\nfine\n");
 }
 
-TEST_F(CoarseFirstTest, WhereTheCoarseModelFailsTheFineOneIsComputedAllTheSame) {
-  WriteBytes(folder_ / "events", ErrorBytes("NO_MODE_IN_BAND"));
-  MakeQueue(
-      absl::StrCat("case $kind in coarse) cat \"$here/events\" >&3; exit 1;; esac\n", kSucceed));
-  Submit();
-  Observer observer;
-  const auto watch = Watch(fine_, observer);
-  EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(NodesAskedForBy(fine_), 0U);
-  EXPECT_EQ(Runs(), "coarse\nfine\n");
-}
-
 TEST_F(CoarseFirstTest, ADaemonKilledInBetweenGoesOnWithTheFineModel) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kFineWaitsAtGate, kSucceed));
@@ -190,16 +178,6 @@ TEST_F(CoarseFirstTest, ADaemonKilledInBetweenGoesOnWithTheFineModel) {
   EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(NodesAskedForBy(fine_), 0U);
   EXPECT_EQ(Runs().rfind("coarse"), 0U) << "the coarse model is computed once";
-}
-
-TEST_F(CoarseFirstTest, ACopyReplacesNoModel) {
-  ASSERT_TRUE(database_->models().PutFile(coarse_, "few", folder_ / "coarse").ok());
-  ASSERT_TRUE(database_->models().CopyIfAbsent(coarse_, fine_, "bowl").ok());
-  EXPECT_EQ(NodesAskedForBy(fine_), 300U);
-  EXPECT_TRUE(database_->models().Find(fine_).ok()) << "with every hash right";
-  ASSERT_TRUE(database_->models().PutFile(fine_, "bowl", folder_ / "fine").ok());
-  ASSERT_TRUE(database_->models().CopyIfAbsent(coarse_, fine_, "bowl").ok());
-  EXPECT_EQ(NodesAskedForBy(fine_), 0U);
 }
 
 TEST_F(CoarseFirstTest, ADaemonKilledBeforeTheCoarseModelIsThereComputesBothInOrder) {
@@ -230,31 +208,6 @@ TEST_F(CoarseFirstTest, CancellingTheCoarseJobLetsTheFineOneStart) {
   const auto watch = Watch(fine_, observer);
   EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_FALSE(database_->models().Summary(coarse_).ok());
-}
-
-TEST_F(CoarseFirstTest, AFineJobMayBeCancelledWhileItWaits) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat("read line <\"$here/gate\"\n", kSucceed));
-  Submit();
-  EXPECT_EQ(queue_->Cancel(fine_)->state(), v1::JOB_STATE_CANCELLED);
-  gate.Open();
-  Observer observer;
-  const auto watch = Watch(coarse_, observer);
-  EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_FALSE(database_->models().Summary(fine_).ok());
-}
-
-TEST_F(CoarseFirstTest, TetrahedraHaveNoCoarserMesh) {
-  request_.set_mesh_format("msh");
-  EXPECT_FALSE(CoarseRequest(*ResolveRequest(request_), 5).has_value());
-}
-
-TEST_F(CoarseFirstTest, ASurfaceOfAnyFormatHasACoarserMesh) {
-  for (const MeshFormat& format : kMeshFormats) {
-    request_.set_mesh_format(std::string(format.name));
-    EXPECT_EQ(CoarseRequest(*ResolveRequest(request_), 5).has_value(), format.is_surface)
-        << format.name;
-  }
 }
 
 TEST_F(CoarseFirstTest, AFineSurfaceIsTakenWithLinearElements) {

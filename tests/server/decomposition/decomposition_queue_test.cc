@@ -9,7 +9,6 @@
 namespace carillon {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 TEST_F(DecompositionQueueTest, AThousandSubmitsOfFiftyClientsComputeOnceAndAllAreTold) {
@@ -75,49 +74,6 @@ TEST_F(DecompositionQueueTest, AModelThatGoesNoFartherIsNotComputedForEver) {
   EXPECT_EQ(RunCount(), 1U);
 }
 
-TEST_F(DecompositionQueueTest, AnOpenBandIsNotComputedAgainWhereItWasLowered) {
-  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cp \"$here/model20\" \"$out\";; ",
-                         "*) cp \"$here/lowered\" \"$out\";; esac"));
-  SubmitAndAwaitEnd(Request(0));
-  v1::CreateModalModelRequest softer = Request(0);
-  softer.set_size(2);
-  for (const v1::CreateModalModelRequest& open : {Request(0), softer}) {
-    EXPECT_EQ(Submit(open).state(), v1::JOB_STATE_SUCCEEDED);
-  }
-  EXPECT_EQ(Submit(Request(4'000)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 1U);
-  // A band that reaches higher is computed, and serves an open one after that.
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-  EXPECT_EQ(Submit(Request(0)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
-TEST_F(DecompositionQueueTest, ARefusalOfABandIsNoRefusalOfAnOpenOne) {
-  WriteBytes(folder_ / "events", ErrorBytes("TOO_MANY_MODES"));
-  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cat \"$here/events\" >&3; exit 1;; ",
-                         "*) cp \"$here/lowered\" \"$out\";; esac"));
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "TOO_MANY_MODES");
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(0)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
-TEST_F(DecompositionQueueTest, ARunningJobIsExtendedByAFartherRequest) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kCount, kWaitAtGate, kSucceed));
-  Diary diary;
-  const auto watch = Watch(Submit(Request(10'000)), diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_RUNNING);
-  gate.Open();
-  gate.Open();
-  const v1::Job job = diary.AwaitEnd();
-  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-  EXPECT_GE((*database_->models().Find(DigestOf(job)))->complete_to_eigenvalue,
-            WantedEigenvalue(*ResolveRequest(Request(20'000))) * (1 - 1e-9));
-}
-
 TEST_F(DecompositionQueueTest, ARefusalIsRememberedAcrossARestart) {
   WriteBytes(folder_ / "events", ErrorBytes("MESH_NOT_CLOSED"));
   MakeQueue(absl::StrCat(kCount, "cat \"$here/events\" >&3; exit 1"));
@@ -138,33 +94,6 @@ TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBa
   EXPECT_EQ(Submit(Request(10'000)).state(), v1::JOB_STATE_FAILED);
   EXPECT_EQ(RunCount(), 1U);
   EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
-TEST_F(DecompositionQueueTest, ACrashIsTriedAnotherWay) {
-  MakeQueue(absl::StrCat(kCount, "case $(cat \"$request\") in *cautious:\\ true*) ", kSucceed,
-                         ";; *) kill -SEGV $$;; esac"));
-  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
-  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(job.way(), 1U);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
-TEST_F(DecompositionQueueTest, AWorkerThatIsKilledOnceRunsAgainInTheSameWay) {
-  MakeQueue(
-      absl::StrCat(kCount, "[ $(wc -l <\"$here/runs\") -gt 1 ] || kill -KILL $$\n", kSucceed));
-  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
-  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED) << job.error().message();
-  EXPECT_EQ(job.way(), 0U);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
-TEST_F(DecompositionQueueTest, AWorkerThatTheKernelKillsTwiceLacksMemory) {
-  options_.kernel_counts = folder_ / "vmstat";
-  WriteBytes(options_.kernel_counts, "oom_kill 0\n");
-  MakeQueue(absl::StrCat(
-      kCount, "echo \"oom_kill $(wc -l <\"$here/runs\")\" >\"$here/vmstat\"\nkill -KILL $$"));
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "OUT_OF_MEMORY");
   EXPECT_EQ(RunCount(), 2U);
 }
 
@@ -248,26 +177,6 @@ TEST_F(DecompositionQueueTest, AJobWhoseModelWasStoredJustBeforeTheEndIsNotRunAg
   EXPECT_FALSE(std::filesystem::exists(folder_ / "runs"));
 }
 
-TEST_F(DecompositionQueueTest, CancelEndsAQueuedJobAtOnceAndARunningOneSoon) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  Diary first;
-  const v1::Job running = Submit(Request(20'000, 1));
-  const auto watch = Watch(running, first);
-  first.Await(v1::JOB_STATE_RUNNING);
-  const v1::Job queued = Submit(Request(20'000, 2));
-  const v1::Job cancelled = *queue_->Cancel(DigestOf(queued));
-  EXPECT_EQ(cancelled.state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_EQ(cancelled.error().reason(), "JOB_CANCELLED");
-  EXPECT_TRUE(queue_->Cancel(DigestOf(running)).ok());
-  EXPECT_EQ(first.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_EQ(queue_->Cancel(DigestOf(running))->state(), v1::JOB_STATE_CANCELLED);
-  Open("carillon.db");
-  MakeQueue(kSucceed);
-  EXPECT_EQ(queue_->Get(DigestOf(running))->state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000, 1)).state(), v1::JOB_STATE_SUCCEEDED);
-}
-
 TEST_F(DecompositionQueueTest, ASubmitAfterACancelIsServedEvenIfTheWorkerStillDies) {
   const Gate gate(folder_ / "gate");
   const NamedPipe started(folder_ / "started");
@@ -280,21 +189,6 @@ TEST_F(DecompositionQueueTest, ASubmitAfterACancelIsServedEvenIfTheWorkerStillDi
   Diary again;
   const auto watch_again = Watch(Submit(Request(20'000)), again);
   EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
-}
-
-TEST_F(DecompositionQueueTest, DeletingAModelEndsItsExtension) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  gate.Open();
-  const std::string digest = DigestOf(SubmitAndAwaitEnd(Request(10'000)));
-  Diary diary;
-  const auto watch = Watch(Submit(Request(20'000)), diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  EXPECT_TRUE(queue_->DeleteModel(digest).ok());
-  EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_THAT(queue_->Get(digest).status().ToString(), HasSubstr("JOB_NOT_FOUND"));
-  EXPECT_FALSE(database_->models().Find(digest).ok());
-  EXPECT_THAT(queue_->DeleteModel(digest).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
 }
 
 TEST_F(DecompositionQueueTest, ListsJobsNewestFirstAsTheyStandNow) {
@@ -325,16 +219,6 @@ TEST_F(DecompositionQueueTest, RefusesMoreThanItCanRemember) {
   EXPECT_TRUE(absl::IsResourceExhausted(refused.status()));
   EXPECT_THAT(refused.status().ToString(), HasSubstr("QUEUE_FULL"));
   EXPECT_GE(std::stoi(ToErrorInfo(refused.status()).metadata().at("retry_after_s")), 1);
-}
-
-TEST_F(DecompositionQueueTest, RefusesAMeshThatWasNeverUploaded) {
-  MakeQueue(kSucceed);
-  EXPECT_THAT(queue_->Submit(SampleRequest(Sha256Hex("other"))).status().ToString(),
-              HasSubstr("MESH_NOT_FOUND"));
-  EXPECT_THAT(queue_->Get(Sha256Hex("other")).status().ToString(), HasSubstr("JOB_NOT_FOUND"));
-  EXPECT_THAT(queue_->Cancel("x").status().ToString(), HasSubstr("JOB_NOT_FOUND"));
-  EXPECT_THAT(queue_->Watch("x", [](const v1::Job&) {}).status().ToString(),
-              HasSubstr("JOB_NOT_FOUND"));
 }
 
 }  // namespace

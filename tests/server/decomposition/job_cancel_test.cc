@@ -52,28 +52,6 @@ TEST_F(JobCancelTest, AJobGoesOnUntilAllThatAskedForItHaveCancelledIt) {
   EXPECT_EQ(CancelFor("alice", job), v1::JOB_STATE_CANCELLED);
 }
 
-TEST_F(JobCancelTest, ARunningJobGoesOnForTheOthers) {
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  Diary diary;
-  const v1::Job job = SubmitFor("alice", 2);
-  const auto watch = Watch(job, diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  SubmitFor("bob", 2);
-  EXPECT_EQ(CancelFor("alice", job), v1::JOB_STATE_RUNNING);
-  gate_.Open();
-  EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
-}
-
-TEST_F(JobCancelTest, AClientThatAsksAgainWantsTheJobAgain) {
-  MakeBusyQueue();
-  const v1::Job job = SubmitFor("alice", 2);
-  SubmitFor("bob", 2);
-  CancelFor("bob", job);
-  SubmitFor("bob", 2);
-  EXPECT_EQ(CancelFor("alice", job), v1::JOB_STATE_QUEUED);
-  EXPECT_EQ(CancelFor("bob", job), v1::JOB_STATE_CANCELLED);
-}
-
 TEST_F(JobCancelTest, AStrangerIsRefusedAndACallForAllEndsTheJob) {
   MakeBusyQueue();
   const v1::Job job = SubmitFor("alice", 2);
@@ -84,18 +62,6 @@ TEST_F(JobCancelTest, AStrangerIsRefusedAndACallForAllEndsTheJob) {
   SubmitFor("bob", 2);
   EXPECT_EQ(queue_->Cancel(DigestOf(job))->state(), v1::JOB_STATE_CANCELLED);
   EXPECT_EQ(CancelFor("mallory", job), v1::JOB_STATE_CANCELLED) << "it has ended";
-}
-
-TEST_F(JobCancelTest, WhoCancelledARunningJobCannotCancelItForTheNextClient) {
-  MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  Diary diary;
-  const v1::Job job = SubmitFor("mallory", 2);
-  const auto watch = Watch(job, diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  CancelFor("mallory", job);
-  SubmitFor("alice", 2);
-  // The job may be between its runs, but it is alice's.
-  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "mallory").status()));
 }
 
 TEST_F(JobCancelTest, AJobOfAnEarlierDaemonIsCancelledByThoseThatWantedItThere) {
@@ -112,17 +78,6 @@ TEST_F(JobCancelTest, AJobOfAnEarlierDaemonIsCancelledByThoseThatWantedItThere) 
   SubmitFor("mallory", 2);
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
   EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "alice").status()));
-}
-
-TEST_F(JobCancelTest, AJobThatAClientHasCancelledCountsForAnother) {
-  settings_.max_queued_count_of_client = 1;
-  MakeBusyQueue();
-  const v1::Job job = SubmitFor("alice", 2);
-  SubmitFor("bob", 2);
-  EXPECT_TRUE(absl::IsResourceExhausted(queue_->Submit(Request(20'000, 3), "alice").status()));
-  CancelFor("alice", job);
-  EXPECT_TRUE(queue_->Submit(Request(20'000, 3), "alice").ok());
-  EXPECT_TRUE(absl::IsResourceExhausted(queue_->Submit(Request(20'000, 4), "bob").status()));
 }
 
 TEST_F(JobCancelTest, TheTransferOfAModelIsWantedByThoseThatWantTheModel) {

@@ -12,7 +12,6 @@ namespace {
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::StartsWith;
 
 class JobEventsTest : public DecompositionQueueTest {
@@ -56,26 +55,6 @@ TEST_F(JobEventsTest, AFailedJobIsAWarningWithItsReason) {
                                            " reason=" + ended.error().reason() + " message="),
                                 HasSubstr(" label=\"my bell\""), HasSubstr(" client=robot"))));
   EXPECT_THAT(Levels(), ElementsAre(LogLevel::kWarning));
-}
-
-TEST_F(JobEventsTest, AStoredModelIsNamedWithItsSize) {
-  MakeQueue(kSucceed);
-  const std::string digest = DigestOf(SubmitAndAwaitEnd(Request(10'000)));
-  const ModelSummary model = *database_->models().Summary(digest);
-  EXPECT_THAT(Lines(), ElementsAre("model_stored model=modalModels/" + digest +
-                                   " modes=3 bytes=" + std::to_string(model.stored_bytes)));
-}
-
-TEST_F(JobEventsTest, ACancelledJobIsNoFailure) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(kWaitAtGate);
-  Diary diary;
-  const v1::Job job = Submit(Request(20'000));
-  const auto watch = Watch(job, diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  ASSERT_TRUE(queue_->Cancel(DigestOf(job)).ok());
-  diary.AwaitEnd();
-  EXPECT_THAT(Lines(), IsEmpty());
 }
 
 TEST_F(JobEventsTest, AJobThatIsGivenUpAtTheStartIsAFailure) {

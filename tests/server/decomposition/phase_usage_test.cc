@@ -39,12 +39,5 @@ TEST(PhaseUsage, TimeBetweenTwoRunsOfAJobBelongsToNoPhase) {
   EXPECT_EQ(usage.uses()[v1::PHASE_MESH].seconds, 2);
 }
 
-TEST(PhaseUsage, APhaseThatIsNoneCountsAsUnspecified) {
-  PhaseUsage usage;
-  usage.Report("a", At(static_cast<v1::Phase>(99), 5), seconds(1));
-  usage.End("a", seconds(2));
-  EXPECT_EQ(usage.uses()[v1::PHASE_UNSPECIFIED].seconds, 1);
-}
-
 }  // namespace
 }  // namespace carillon

@@ -101,14 +101,6 @@ class TransferJobTest : public ::testing::Test {
     ASSERT_TRUE(job.ok()) << job.status();
   }
 
-  /// Asks for the model of another mesh, without a transfer, and returns its digest.
-  std::string SubmitOther() {
-    v1::CreateModalModelRequest other = SampleRequest(database_->meshes().Put("other")->digest);
-    other.set_without_transfer(true);
-    EXPECT_TRUE(queue_->Submit(other).ok());
-    return RequestDigest(*ResolveRequest(other));
-  }
-
   v1::Job AwaitEnd(const std::string& digest) { return Ending(*queue_, digest).Await(); }
 
   size_t TransferCount() {
@@ -117,15 +109,6 @@ class TransferJobTest : public ::testing::Test {
   }
 
   std::string Runs() { return ReadBytes(folder_ / "runs"); }
-
-  /// Waits until the workers of `runs` have begun.
-  void AwaitRuns(const std::string& runs) {
-    const auto end = std::chrono::steady_clock::now() + kDeadline;
-    while (Runs() != runs && std::chrono::steady_clock::now() < end) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    ASSERT_EQ(Runs(), runs);
-  }
 
   TemporaryFolder folder_;
   SystemClock clock_;
@@ -219,54 +202,6 @@ TEST_F(TransferJobTest, IsMadeForAModelThatWasStoredJustBeforeTheDaemonDied) {
   EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "transfer\n");
-}
-
-TEST_F(TransferJobTest, EndsWithItsModel) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
-  Submit();
-  AwaitEnd(digest_);
-  Ending ending(*queue_, transfer_);
-  AwaitRuns("model\ntransfer\n");
-  ASSERT_TRUE(queue_->DeleteModel(digest_).ok());
-  EXPECT_EQ(ending.Await().state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_FALSE(queue_->Get(transfer_).ok());
-  Open();
-  EXPECT_TRUE(database_->jobs().Unfinished()->empty());
-}
-
-TEST_F(TransferJobTest, CanBeCancelledAndAskedForAgain) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
-  Submit();
-  AwaitEnd(digest_);
-  ASSERT_TRUE(queue_->Cancel(transfer_).ok());
-  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_CANCELLED);
-  EXPECT_EQ(TransferCount(), 0U);
-  gate.Open();
-  Submit();
-  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
-}
-
-TEST_F(TransferJobTest, DoesNotHoldUpAModel) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
-  Submit();
-  AwaitRuns("model\ntransfer\n");
-  EXPECT_EQ(AwaitEnd(SubmitOther()).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(queue_->Get(transfer_)->state(), v1::JOB_STATE_RUNNING);
-}
-
-TEST_F(TransferJobTest, YieldsTheMemoryToAModelAndRunsAgain) {
-  const Gate gate(folder_ / "gate");
-  options_.memory_budget_bytes = 300 << 20;  // a transfer is estimated to take 256 MiB
-  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
-  Submit();
-  AwaitRuns("model\ntransfer\n");
-  EXPECT_EQ(AwaitEnd(SubmitOther()).state(), v1::JOB_STATE_SUCCEEDED);
-  AwaitRuns("model\ntransfer\nmodel\ntransfer\n");
-  gate.Open();
-  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
 }
 
 TEST_F(TransferJobTest, ATransferOfOtherModesIsAFailureAndNotStored) {

@@ -59,18 +59,5 @@ TEST_F(SharpEdgesTest, AnEdgeFartherThanThreeTimesTheDepthDoesNotCount) {
   EXPECT_FALSE(edges_.Protruding({0, 0, -0.045}, 0.005, {0, 0, 1}));
 }
 
-TEST_F(SharpEdgesTest, AContactOnTheSurfaceStaysWhereItIs) {
-  EXPECT_FALSE(edges_.Protruding({-0.0499, -0.0499, -0.05}, 0, {1, 1, 1}));
-}
-
-TEST_F(SharpEdgesTest, AContactWithoutAnImpulseStaysWhereItIs) {
-  EXPECT_FALSE(edges_.Protruding({-0.045, -0.045, -0.045}, 0.005, {0, 0, 0}));
-}
-
-TEST_F(SharpEdgesTest, ARoughSurfaceHasNone) {
-  const std::vector<std::array<uint32_t, 2>> many(SharpEdges::kMostEdges + 1, {0, 1});
-  EXPECT_FALSE(SharpEdges(vertices_, many).Protruding({-0.045, -0.045, -0.045}, 0.005, {1, 1, 1}));
-}
-
 }  // namespace
 }  // namespace carillon

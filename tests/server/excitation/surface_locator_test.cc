@@ -127,14 +127,6 @@ TEST(SurfaceLocator, AGivenTriangleOfWhichNothingIsLeftIsStruckWhereItWas) {
   EXPECT_LT(located.distance_m, 1e-7);
 }
 
-TEST(SurfaceLocator, ACornerOfTheSurfaceIsFoundExactly) {
-  const Tube tube;
-  const auto locator = SurfaceLocator::Make(tube.surfaces()).value();
-  const LocatedPoint located = locator->Nearest({0.0125, 0, -1}).value();
-  EXPECT_NEAR(located.distance_m, 1, 1e-9);
-  EXPECT_NEAR(*std::ranges::max_element(located.weights), 1, 1e-6);  // vertices are floats
-}
-
 TEST(SurfaceLocator, AnswersSeveralThreadsAtOnce) {
   const Tube tube;
   const auto locator = SurfaceLocator::Make(tube.surfaces()).value();
@@ -159,17 +151,6 @@ TEST(SurfaceLocator, SaysWhyAContactCannotBeLocated) {
               HasSubstr("CONTACT_MALFORMED"));
   EXPECT_THAT(locator->OnGivenTriangle({0, {1, 1, 0}}).status().ToString(),
               HasSubstr("CONTACT_MALFORMED"));
-}
-
-TEST(SurfaceLocator, RefusesASurfaceWithoutTrianglesOrWithABadIndex) {
-  Tube tube;
-  LocatorSurfaces surfaces = tube.surfaces();
-  surfaces.triangles = {};
-  EXPECT_THAT(SurfaceLocator::Make(surfaces).status().ToString(),
-              HasSubstr("MODAL_MODEL_MALFORMED"));
-  tube.triangles[3][1] = static_cast<uint32_t>(tube.vertices.size());
-  EXPECT_THAT(SurfaceLocator::Make(tube.surfaces()).status().ToString(),
-              HasSubstr("triangle 3 of the sounding surface"));
 }
 
 TEST(ClosestPoint, ATriangleWithoutAreaCountsAsItsEdges) {

@@ -53,16 +53,5 @@ TEST_F(LossLogTest, FramesOfAFaultThatTheLogNamesAreNoGaps) {
   EXPECT_THAT(Lines(), ElementsAre(HasSubstr("gaps: 100 frames")));
 }
 
-TEST_F(LossLogTest, GapsDoNotEndWhileTheDeviceHasAFault) {
-  log_.Note(100, seconds(1), false);
-  EXPECT_THAT(Lines(), ElementsAre(HasSubstr("gaps: 100 frames")));
-  for (int second = 2; second < 100; ++second) log_.Note(100U * second, seconds(second), true);
-  log_.Note(10000, seconds(100), false);
-  log_.Note(10000, seconds(159), false);
-  EXPECT_THAT(Lines(), IsEmpty());
-  log_.Note(10000, seconds(160), false);
-  EXPECT_THAT(Lines(), ElementsAre(HasSubstr("no gaps for 60 s; 10000 frames")));
-}
-
 }  // namespace
 }  // namespace carillon

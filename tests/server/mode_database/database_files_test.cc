@@ -66,12 +66,6 @@ class DatabaseFilesTest : public ::testing::Test {
   std::unique_ptr<ModeDatabase> database_;
 };
 
-TEST_F(DatabaseFilesTest, AfterTheFileWasRemovedNothingIsAcknowledgedAndNoOtherIsMade) {
-  ExpectLost([&] { std::filesystem::remove(file_); });
-  EXPECT_FALSE(database_->database().Read([](SqliteConnection&) { return absl::OkStatus(); }).ok());
-  EXPECT_FALSE(std::filesystem::exists(file_));
-}
-
 TEST_F(DatabaseFilesTest, AfterTheFileWasReplacedNothingIsAcknowledged) {
   ExpectLost([&] {
     std::filesystem::copy_file(file_, folder_ / "copy");
@@ -110,32 +104,6 @@ TEST_F(DatabaseFilesTest, AFileThatWasReplacedAmidAChangeIsLost) {
     return connection.Run("UPDATE models SET label = 'changed'");
   });
   EXPECT_THAT(status.ToString(), HasSubstr("DATABASE_LOST: "));
-}
-
-TEST_F(DatabaseFilesTest, AFileThatIsTouchedIsNotLost) {
-  std::filesystem::last_write_time(file_, std::filesystem::file_time_type::clock::now());
-  EXPECT_TRUE(StoreMuch(database_->database()).ok());
-}
-
-TEST_F(DatabaseFilesTest, AFileThatAnotherProgramMakesSmallerBySqliteIsNotLost) {
-  ASSERT_TRUE(StoreMuch(database_->database()).ok());
-  const uintmax_t size = std::filesystem::file_size(file_);
-  const auto other = *SqliteConnection::Open(file_);
-  ASSERT_TRUE(other->RunScript("DROP TABLE much; VACUUM; PRAGMA wal_checkpoint(TRUNCATE)").ok());
-  ASSERT_LT(std::filesystem::file_size(file_), size / 2);
-  EXPECT_TRUE(Put("new").ok());
-  Open();
-  EXPECT_TRUE(Has("new"));
-}
-
-TEST_F(DatabaseFilesTest, ADeletionWritesLittleIntoTheLog) {
-  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
-  ASSERT_TRUE(Put("large").ok());
-  const auto size = std::filesystem::file_size(file_);
-  EXPECT_GT(size, 12U << 20U);
-  Open();  // the log is gone
-  ASSERT_TRUE(database_->models().Delete(Sha256Hex("large")).ok());
-  EXPECT_LT(std::filesystem::file_size(log_), size / 8);
 }
 
 TEST_F(DatabaseFilesTest, ACollectionDeletesMoreThanOneTransactionDoes) {
@@ -184,15 +152,6 @@ TEST_F(DatabaseFilesTest, TheLogThatGrewBesideALongReadIsSmallAfterIt) {
   EXPECT_LE(std::filesystem::file_size(log_), 16U << 20U);
 }
 
-TEST_F(DatabaseFilesTest, AnUploadAfterTheFolderWasRenamedIsToldThatTheDatabaseIsLost) {
-  const TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "data");
-  const std::unique_ptr<ModeDatabase> database =
-      *ModeDatabase::Open(folder / "data/carillon.db", clock_);
-  std::filesystem::rename(folder / "data", folder / "other");
-  EXPECT_THAT(database->meshes().Begin().status().ToString(), HasSubstr("DATABASE_LOST: "));
-}
-
 TEST_F(DatabaseFilesTest, TheLogStaysSmallHoweverMuchIsWritten) {
   for (int i = 0; i < 60; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
   EXPECT_GT(std::filesystem::file_size(file_), 1U << 20U);
@@ -213,25 +172,6 @@ TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
   EXPECT_TRUE(Put("new").ok());
   Open();
   EXPECT_TRUE(Has("new"));
-}
-
-TEST_F(DatabaseFilesTest, AFileThatItsDaemonMakesSmallerIsNotLost) {
-  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
-  std::atomic<bool> done = false;
-  std::thread checker([&] {
-    while (!done && database_->database().CheckState().ok()) {
-    }
-  });
-  for (int round = 0; round < 5; ++round) {
-    for (int i = 0; i < 4; ++i) EXPECT_TRUE(Put(std::to_string(i)).ok());
-    for (int i = 0; i < 4; ++i) {
-      EXPECT_TRUE(database_->models().Delete(Sha256Hex(std::to_string(i))).ok());
-    }
-    for (int i = 0; i < 5; ++i) EXPECT_TRUE(database_->database().Tidy().ok());
-  }
-  done = true;
-  checker.join();
-  EXPECT_TRUE(database_->database().CheckState().ok());
 }
 
 TEST_F(DatabaseFilesTest, AReaderConnectsWhileAChangeIsBeingMade) {
@@ -278,17 +218,6 @@ TEST_F(DatabaseFilesTest, ADatabaseMayLieWhereALinkLeads) {
   ExpectLost([&] { std::filesystem::remove(disk / "real.db"); });
 }
 
-TEST_F(DatabaseFilesTest, WhatIsNoFileIsNoDatabase) {
-  std::filesystem::create_directory(folder_ / "folder.db");
-  std::filesystem::create_symlink("loop.db", folder_ / "loop.db");
-  for (const auto& [name, why] : {std::pair("folder.db", "it is a folder; move it away"),
-                                  std::pair("loop.db", "leads to no file; mount the disk")}) {
-    const std::string error = ModeDatabase::Open(folder_ / name, clock_).status().ToString();
-    EXPECT_THAT(error, HasSubstr("DATABASE_UNUSABLE: "));
-    EXPECT_THAT(error, HasSubstr(why));
-  }
-}
-
 TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
   std::vector<bool> good;
   DatabaseKeeper keeper(database_->database(),
@@ -298,22 +227,6 @@ TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
   std::filesystem::remove(file_);
   for (int i = 0; i < 3; ++i) keeper.Look();
   EXPECT_THAT(good, testing::ElementsAre(true, false));
-}
-
-TEST(NetworkFileSystem, IsTheKindOfOneOnAnotherComputer) {
-  constexpr int64_t kNfs = 0x6969, kCifs = 0xff534d42, kExt4 = 0xef53;
-  EXPECT_EQ(NetworkFileSystem(kNfs), "NFS");
-  EXPECT_EQ(NetworkFileSystem(kCifs), "SMB");
-  EXPECT_EQ(NetworkFileSystem(kExt4), "");
-  EXPECT_EQ(NetworkFileSystemOf("/proc"), "");
-}
-
-TEST(DiskReserve, IsAQuarterOfTheFreeSpaceWithinItsBounds) {
-  constexpr uintmax_t kMib = 1 << 20;
-  EXPECT_EQ(DiskReserve::SizeOn(1000 * kMib), 16 * kMib);
-  EXPECT_EQ(DiskReserve::SizeOn(60 * kMib), 15 * kMib);
-  EXPECT_EQ(DiskReserve::SizeOn(2 * kMib), kMib);
-  EXPECT_EQ(DiskReserve::SizeOn(kMib), 0U);
 }
 
 }  // namespace

@@ -117,32 +117,6 @@ TEST_P(DiskFaultTest, EveryWriteOfEveryCallMayFail) {
   EXPECT_GT(failures, 20);
 }
 
-TEST_P(DiskFaultTest, AfterARefusedWriteTheNextOneSucceeds) {
-  FaultyDisk::FailAfter(0, GetParam());
-  EXPECT_FALSE(Put("new").ok());
-  FaultyDisk::Repair();
-  EXPECT_TRUE(Put("new").ok());
-  ASSERT_TRUE(Open().ok());
-  EXPECT_TRUE(database_->models().Find(Sha256Hex("new")).ok());
-}
-
-TEST_P(DiskFaultTest, ADatabaseThatCannotBeMadeIsMadeOnceTheDiskIsRepaired) {
-  const std::filesystem::path fresh = folder_ / "fresh.db";
-  int64_t good_count = 0;
-  for (bool failed = true; failed; ++good_count) {
-    FaultyDisk::FailAfter(good_count, GetParam());
-    const auto opened = ModeDatabase::Open(fresh, clock_);
-    failed = FaultyDisk::Repair();
-    EXPECT_EQ(ModeDatabase::Open(fresh, clock_).status(), absl::OkStatus());
-    if (opened.ok() || !failed) continue;
-    EXPECT_TRUE(SaysWhatTheDiskDid(opened.status())) << opened.status();
-    std::filesystem::remove(fresh);
-    std::filesystem::remove(fresh.string() + "-wal");
-    std::filesystem::remove(fresh.string() + "-shm");
-  }
-  EXPECT_GT(good_count, 5);
-}
-
 std::string NameOf(const ::testing::TestParamInfo<DiskFault>& fault) {
   switch (fault.param) {
     case DiskFault::kFull:
@@ -198,21 +172,6 @@ TEST(TemporaryFolder, NeedsNoSpaceForAnyChange) {
   EXPECT_EQ(models.Collect(0).status(), absl::OkStatus());
   EXPECT_EQ(database->meshes().Collect(std::chrono::milliseconds(-1)).status(), absl::OkStatus());
   EXPECT_EQ(database->database().Tidy(), absl::OkStatus());
-}
-
-TEST(DatabaseMemory, ALackOfItIsSaid) {
-  const TemporaryFolder folder;
-  WriteRecords(folder / "model", SampleRecords(SampleModel(20, 100)));
-  const SystemClock clock;
-  const std::unique_ptr<ModeDatabase> database = *ModeDatabase::Open(folder / "carillon.db", clock);
-  const auto put = [&] {
-    return database->models().PutFile(Sha256Hex("a"), "a", folder / "model").status();
-  };
-  LimitDatabaseMemory(1);
-  const absl::Status status = put();
-  LimitDatabaseMemory(0);
-  EXPECT_THAT(status.ToString(), HasSubstr("SERVER_OUT_OF_MEMORY: "));
-  EXPECT_TRUE(put().ok());
 }
 
 }  // namespace

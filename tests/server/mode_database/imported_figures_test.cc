@@ -71,25 +71,5 @@ TEST(ImportedFigures, AModelWithAnImpossibleFigureIsRefusedAndTheFigureNamed) {
               names("mesh_digest"));
 }
 
-TEST(ImportedFigures, ATransferWithAnImpossibleFigureIsRefusedAndTheFigureNamed) {
-  const auto refusal = [](const std::function<void(v1::TransferHeader&)>& change) {
-    v1::TransferHeader header = SampleTransferHeader(3, 10);
-    EXPECT_TRUE(CheckFigures(header).ok());
-    change(header);
-    return CheckFigures(header).ToString();
-  };
-  const auto names = [](const char* what) {
-    return AllOf(HasSubstr("TRANSFER_MALFORMED: "), HasSubstr(what));
-  };
-  for (const double figure : {-1.0, 0.0, kNan, kInfinity, 1e300}) {
-    EXPECT_THAT(refusal([=](auto& header) { header.set_radius_m(figure); }), names("radius_m"));
-    EXPECT_THAT(refusal([=](auto& header) { header.set_air_density_kg_per_m3(figure); }),
-                names("air_density_kg_per_m3"));
-    EXPECT_THAT(refusal([=](auto& header) { header.set_sound_speed_m_per_s(figure); }),
-                names("sound_speed_m_per_s"));
-  }
-  EXPECT_THAT(refusal([](auto& header) { header.set_mesh_digest("A"); }), names("mesh_digest"));
-}
-
 }  // namespace
 }  // namespace carillon

@@ -164,33 +164,6 @@ TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExported) {
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
 }
 
-TEST_F(ModeDatabaseTest, ADamagedModelIsReportedOnceLeftOutOfListsAndReplacedByTheNext) {
-  ASSERT_TRUE(Put(a_, SampleModel(3, 4), "bell").ok());
-  ASSERT_TRUE(Put(b_, SampleModel(3, 4)).ok());
-  ASSERT_TRUE(database_->models().Update(a_, {.add_tags = {"bronze"}, .pinned = true}).ok());
-  FlipABitWithin("sample 1.0");
-  std::vector<std::string> reported;
-  database_->models().ListenToQuarantine(
-      [&](const std::string& digest, const absl::Status&) { reported.push_back(digest); });
-  ASSERT_EQ(database_->models().List({}, 0, "")->models.size(), 1U);
-  const std::string damaged = database_->models().List({}, 0, "")->models[0].digest == a_ ? b_ : a_;
-  EXPECT_FALSE(database_->models().Find(damaged).ok());
-  EXPECT_THAT(reported, ElementsAre(damaged));
-  ASSERT_TRUE(Put(damaged, SampleModel(2, 4)).ok());
-  EXPECT_TRUE(database_->models().Find(damaged).ok());
-  const auto healed = database_->models().Summary(a_);
-  EXPECT_EQ(healed->label, "bell");
-  EXPECT_THAT(healed->tags, ElementsAre("bronze"));
-  EXPECT_TRUE(healed->pinned);
-}
-
-TEST_F(ModeDatabaseTest, AFlippedBitInAHeaderIsFoundWhenTheModelIsRead) {
-  ASSERT_TRUE(Put(a_, SampleModel(3, 4)).ok());
-  FlipABitWithin("sample 1.0");
-  EXPECT_EQ(database_->models().Find(a_).status().code(), absl::StatusCode::kDataLoss);
-  EXPECT_EQ(database_->models().Summary(a_).status().code(), absl::StatusCode::kDataLoss);
-}
-
 TEST_F(ModeDatabaseTest, AFlippedBitInAMeshIsFoundWhenItIsWrittenOut) {
   const auto mesh = database_->meshes().Put("solid of revolution");
   ASSERT_TRUE(mesh.ok());
@@ -208,26 +181,6 @@ TEST_F(ModeDatabaseTest, ANewerSchemaIsRefused) {
   EXPECT_EQ(opened.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(opened.status().ToString(), HasSubstr("SCHEMA_TOO_NEW: the database has schema "
                                                     "version 99"));
-}
-
-TEST_F(ModeDatabaseTest, AFileThatIsNoDatabaseIsRefused) {
-  WriteBytes(folder_ / "text", std::string(5000, 'x'));
-  EXPECT_THAT(ModeDatabase::Open(folder_ / "text", clock_).status().ToString(),
-              HasSubstr("DATABASE_CORRUPT"));
-  EXPECT_THAT(ModeDatabase::Open(folder_.path(), clock_).status().ToString(),
-              HasSubstr("DATABASE_UNUSABLE"));
-}
-
-TEST_F(ModeDatabaseTest, AModelIsInMemoryOnceHoweverManyAskAtATime) {
-  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
-  std::vector<std::shared_ptr<const ModalModel>> found(8);
-  std::vector<std::thread> threads;
-  threads.reserve(found.size());
-  for (auto& model : found) {
-    threads.emplace_back([&] { model = database_->models().Find(a_).value(); });
-  }
-  for (std::thread& thread : threads) thread.join();
-  for (const auto& model : found) EXPECT_EQ(model, found.front());
 }
 
 TEST_F(ModeDatabaseTest, AReplacedModelIsReadAnewAndKeepsItsLabel) {
@@ -328,40 +281,6 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   EXPECT_TRUE(database_->models().Find(c).ok());
 }
 
-TEST_F(ModeDatabaseTest, AModelLargerThanTheMemoryIsRefusedByItsHeader) {
-  constexpr uint64_t kVertexCount = 7;
-  v1::ModalModelRecord record = SampleRecords(SampleModel(20, kVertexCount)).front();
-  for (v1::ArrayDescriptor& array : *record.mutable_header()->mutable_arrays()) {
-    for (uint64_t& size : *array.mutable_shape()) {
-      if (size == kVertexCount) size = uint64_t{1} << 32U;
-    }
-  }
-  auto import = database_->models().Import(b_, "");
-  ASSERT_TRUE(import.ok());
-  EXPECT_THAT(import->Append(record).ToString(), HasSubstr("MODAL_MODEL_TOO_LARGE: "));
-}
-
-TEST_F(ModeDatabaseTest, AModelWithMoreModesThanADecompositionFindsIsRefusedByItsHeader) {
-  constexpr uint32_t kModeCount = 21;
-  for (const uint32_t count : {kMaxImportedModeCount, kMaxImportedModeCount + 1}) {
-    v1::ModalModelRecord record = SampleRecords(SampleModel(kModeCount, 7)).front();
-    record.mutable_header()->set_mode_count(count);
-    for (v1::ArrayDescriptor& array : *record.mutable_header()->mutable_arrays()) {
-      for (uint64_t& size : *array.mutable_shape()) {
-        if (size == kModeCount) size = count;
-      }
-    }
-    auto import = database_->models().Import(b_, "");
-    ASSERT_TRUE(import.ok());
-    const absl::Status status = import->Append(record);
-    if (count == kMaxImportedModeCount) {
-      EXPECT_TRUE(status.ok()) << status;
-    } else {
-      EXPECT_THAT(status.ToString(), HasSubstr("MODAL_MODEL_TOO_LARGE: the model has 20001 modes"));
-    }
-  }
-}
-
 TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   database_->models().KeepWithin({.bytes = 1});
   ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
@@ -376,21 +295,6 @@ TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   ASSERT_TRUE(import->Finish().ok());
   EXPECT_TRUE(absl::IsNotFound(database_->models().Find(a_).status()));
   EXPECT_TRUE(database_->models().Find(b_).ok());
-}
-
-TEST_F(ModeDatabaseTest, EachModelThatTheBudgetDeletesIsNamedInTheLog) {
-  std::vector<std::string> lines;
-  database_->models().KeepWithin(
-      {.bytes = 1, .log_event = [&](const Event& event) { lines.push_back(event.ToLine()); }});
-  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
-  const uint64_t bytes = database_->models().Summary(a_)->stored_bytes;
-  EXPECT_THAT(lines, testing::IsEmpty());
-  ASSERT_TRUE(Put(b_, SampleModel(10, 100)).ok());
-  EXPECT_THAT(
-      lines,
-      testing::ElementsAre(
-          absl::StrCat("model_deleted model=modalModels/", a_, " bytes=", bytes, " cause=budget"),
-          absl::StrCat("models_collected count=1 bytes=", bytes, " cause=budget budget_bytes=1")));
 }
 
 TEST_F(ModeDatabaseTest, EveryModelOfACollectionInManyTransactionsIsTold) {
@@ -445,13 +349,6 @@ TEST_F(ModeDatabaseTest, AMeshThatNothingRefersToGoesADayAfterItsLastUpload) {
   EXPECT_TRUE(meshes.Find(of_job.digest).ok());
 }
 
-TEST_F(ModeDatabaseTest, OnlyADigestNamesAModel) {
-  WriteRecords(folder_ / "model", SampleRecords(SampleModel(1, 4)));
-  EXPECT_THAT(database_->models().PutFile("../x", "", folder_ / "model").status().ToString(),
-              HasSubstr("INVALID_NAME"));
-  EXPECT_THAT(database_->models().Import("x", "").status().ToString(), HasSubstr("INVALID_NAME"));
-}
-
 TEST_F(ModeDatabaseTest, AMeshSentInPiecesComesBackWhole) {
   std::string bytes;
   for (int i = 0; i < 600'000; ++i) bytes += "v 1 ";
@@ -469,16 +366,6 @@ TEST_F(ModeDatabaseTest, AMeshSentInPiecesComesBackWhole) {
   EXPECT_EQ(std::filesystem::status(folder_ / "mesh").permissions(),
             std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
   EXPECT_TRUE(database_->meshes().Put(bytes).ok()) << "twice is no error";
-}
-
-TEST_F(ModeDatabaseTest, AnEmptyOrUnknownOrTooLargeMeshIsRefused) {
-  EXPECT_THAT(database_->meshes().Put("").status().ToString(), HasSubstr("MESH_EMPTY"));
-  EXPECT_THAT(database_->meshes().Find(a_).status().ToString(), HasSubstr("MESH_NOT_FOUND"));
-  auto upload = database_->meshes().Begin();
-  ASSERT_TRUE(upload.ok());
-  // The view is longer than what it views, and is refused before it is read.
-  const std::string_view too_long("x", MeshStore::kMaxByteCount + 1);
-  EXPECT_THAT(upload->Append(too_long).ToString(), HasSubstr("MESH_TOO_LARGE"));
 }
 
 TEST_F(ModeDatabaseTest, UnfinishedJobsComeBackInTheOrderTheyWereAskedFor) {

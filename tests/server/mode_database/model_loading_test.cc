@@ -107,30 +107,6 @@ TEST_F(ModelLoadingTest, EigenvaluesAreReadWithoutTheRest) {
   EXPECT_TRUE(absl::IsDataLoss(database_->models().Eigenvalues(a_).status()));
 }
 
-TEST_F(ModelLoadingTest, AModelWithoutItsLastChunkIsNotExported) {
-  ASSERT_TRUE((*SqliteConnection::Open(file_))
-                  ->RunScript("DELETE FROM model_chunks WHERE rowid = "
-                              "(SELECT max(rowid) FROM model_chunks)")
-                  .ok());
-  EXPECT_TRUE(database_->models().Export(a_).ok());
-  EXPECT_TRUE(absl::IsDataLoss(database_->models().Export(b_).status()));
-}
-
-TEST_F(ModelLoadingTest, AListenerThatWaitsKeepsNoOtherQuarantineWaiting) {
-  Damage();
-  std::promise<void> told;
-  bool waited_in_vain = false;
-  database_->models().ListenToQuarantine([&](const std::string& digest, const absl::Status&) {
-    if (digest == b_) return told.set_value();
-    waited_in_vain = told.get_future().wait_for(kDeadline) != std::future_status::ready;
-  });
-  std::future<bool> first =
-      std::async(std::launch::async, [&] { return database_->models().Find(a_).ok(); });
-  EXPECT_FALSE(database_->models().Find(b_).ok());
-  EXPECT_FALSE(first.get());
-  EXPECT_FALSE(waited_in_vain);
-}
-
 TEST_F(ModelLoadingTest, AListenerThatIsReplacedHasEnded) {
   Damage();
   std::promise<void> begun;

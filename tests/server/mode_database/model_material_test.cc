@@ -68,26 +68,5 @@ TEST_F(ModelMaterialTest, TheNewestRequestSaysIt) {
   EXPECT_EQ(Remembered(), "oak");
 }
 
-TEST_F(ModelMaterialTest, GoesWithItsModel) {
-  PutModel();
-  ASSERT_TRUE(database_->models().RememberMaterial(digest_, Named("steel")).ok());
-  ASSERT_TRUE(database_->models().Delete(digest_).ok());
-  PutModel();
-  EXPECT_EQ(Remembered(), "");
-}
-
-TEST_F(ModelMaterialTest, ThatHasChangedOnTheDiskIsForgotten) {
-  PutModel();
-  ASSERT_TRUE(database_->models().RememberMaterial(digest_, Named("bell_bronze")).ok());
-  database_.reset();
-  std::string content = ReadBytes(file_);
-  const size_t at = content.find("bell_bronze");
-  ASSERT_NE(at, std::string::npos);
-  content[at] = 'c';
-  WriteBytes(file_, content);
-  Reopen();
-  EXPECT_EQ(Remembered(), "");
-}
-
 }  // namespace
 }  // namespace carillon

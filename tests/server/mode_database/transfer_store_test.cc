@@ -124,15 +124,6 @@ TEST_F(TransferStoreTest, ATransferThatChangedOnTheDiskIsLeftOutAndReported) {
   EXPECT_EQ(Found(10), 2);
 }
 
-TEST_F(TransferStoreTest, CollectionCountsTransfersWithTheirModel) {
-  PutModel(model_);
-  const uint64_t model_bytes = database_->models().Summary(digest_)->stored_bytes;
-  ASSERT_TRUE(Put(model_, 10).ok());
-  const uint64_t bytes = model_bytes + database_->transfers().List(digest_)->front().stored_bytes;
-  EXPECT_EQ(database_->models().Collect(bytes)->model_count, 0U);
-  EXPECT_EQ(database_->models().Collect(bytes - 1)->bytes, bytes);
-}
-
 TEST(StoredTransfer, AModeThatWasNotComputedHasTheEfficiencyOfTheNearestOneThatWas) {
   ModalModel model = SampleModel(3, 4);
   model.eigenvalues = {100, 400, 900};
@@ -154,33 +145,6 @@ TEST(StoredTransfer, PatternsAreTheCoefficientsFarAwayOfUnitPower) {
   const float part = std::sqrt(0.5F);
   EXPECT_THAT(transfer.pattern_re, Pointwise(testing::FloatNear(1e-6F), {part, -part, -part}));
   EXPECT_THAT(transfer.pattern_im, Pointwise(testing::FloatNear(1e-6F), {-part, -part, part}));
-}
-
-TEST(StoredTransfer, AnImpossibleHarmonicIsRefused) {
-  EXPECT_THAT(StoredTransfer::Parse(
-                  SampleTransferBytes(SampleModel(3, 4), {.power_integrals = {1, 2, 3},
-                                                          .harmonics = {0, UINT32_MAX, 0}}))
-                  .status()
-                  .ToString(),
-              HasSubstr("TRANSFER_MALFORMED"));
-}
-
-TEST(StoredTransfer, AnImpossibleRigidBodyIsRefused) {
-  const auto parse = [](const v1::RigidBody& rigid) {
-    return StoredTransfer::Parse(
-        SampleTransferBytes(SampleModel(3, 4), {.power_integrals = {1, 1, 1}, .rigid = rigid}));
-  };
-  ASSERT_TRUE(parse(SampleRigidBody()).ok());
-  EXPECT_TRUE(parse(SampleRigidBody())->Decode().rigid.has_value());
-  v1::RigidBody body = SampleRigidBody();
-  body.set_volume_m3(0);
-  EXPECT_FALSE(parse(body).ok());
-  body = SampleRigidBody();
-  body.mutable_motions()->RemoveLast();
-  EXPECT_FALSE(parse(body).ok());
-  body = SampleRigidBody();
-  body.mutable_motions(3)->set_strengths(2, NAN);
-  EXPECT_FALSE(parse(body).ok());
 }
 
 TEST(StoredTransfer, EveryDamageIsRefused) {

@@ -265,24 +265,6 @@ TEST_F(ContactStreamTest, TheDelayIsOneStepOneBlockAndFiveMillisecondsUnlessGive
   EXPECT_EQ(Open(0)->scheduling_delay_s(), 0);
 }
 
-TEST_F(ContactStreamTest, AFullQueueDropsAndCounts) {
-  const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
-  constexpr uint64_t kCount = 20000;
-  for (uint64_t i = 0; i < kCount; ++i) {
-    stream->intake().Strike(SmallImpulse(1, 1e-6, 1e-7 * static_cast<double>(i)));
-  }
-  stream->intake().EndStep();
-  EXPECT_FALSE(stream->settled());
-  Render(100 * kBlock);  // the mixer takes a bounded number of strikes a block
-  const ContactCounts counts = stream->counts();
-  EXPECT_GT(counts.dropped_count, 0U);
-  EXPECT_GT(counts.accepted_count, 0U);
-  EXPECT_LT(counts.dropped_count, kCount / 2);
-  EXPECT_EQ(counts.accepted_count + counts.late_count + counts.dropped_count, kCount);
-  EXPECT_TRUE(stream->settled());
-}
-
 TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndTheRestSounds) {
   const auto stream = Open(0.01);
   ASSERT_TRUE(stream->intake().BeginStep(0).ok());
@@ -315,15 +297,6 @@ TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndThe
   EXPECT_EQ(stream->counts().accepted_count, 1U);
 }
 
-TEST_F(ContactStreamTest, OutlivesItsScene) {
-  const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
-  ASSERT_TRUE(scenes_.DeleteScene(scene_).ok());
-  stream->intake().Strike(SmallImpulse(1));
-  stream->intake().EndStep();
-  EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr("SCENE_NOT_FOUND: "));
-}
-
 TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
   const auto stream = Open(0.01);
   ASSERT_TRUE(stream->intake().BeginStep(1).ok());
@@ -334,35 +307,6 @@ TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
     EXPECT_THAT(status.ToString(), HasSubstr("INVALID_STREAM: "));
   }
   EXPECT_EQ(stream->counts().step_count, 2U);
-}
-
-TEST_F(ContactStreamTest, TheFirstTimeIsBounded) {
-  for (const double time_s : {-1e308, -1.1e10, 1.1e10, 1e308}) {
-    const auto stream = Open(0.01);
-    EXPECT_THAT(stream->intake().BeginStep(time_s).ToString(),
-                HasSubstr("give seconds, at most 1e+10 before or after 0"));
-  }
-  for (const double time_s : {-1e10, 1.8e9, 1e10}) {
-    const auto stream = Open(0.01);
-    ASSERT_TRUE(stream->intake().BeginStep(time_s).ok());
-    EXPECT_LT(stream->intake().ahead_s(), 1);
-    stream->intake().Strike(SmallImpulse(1));
-    stream->intake().EndStep();
-    Render(4800);
-    EXPECT_EQ(stream->counts().accepted_count, 1U) << time_s;
-  }
-}
-
-TEST_F(ContactStreamTest, RefusesAStepOrADelayOutOfRange) {
-  for (const ContactStreamSettings& settings :
-       std::vector<ContactStreamSettings>{{.step_s = 0},
-                                          {.step_s = 1.1},
-                                          {.step_s = std::nan("")},
-                                          {.step_s = 0.01, .scheduling_delay_s = -0.1},
-                                          {.step_s = 0.01, .scheduling_delay_s = 10.1}}) {
-    EXPECT_THAT(scenes_.OpenContactStream(scene_, settings).status().ToString(),
-                HasSubstr("INVALID_STREAM: "));
-  }
 }
 
 }  // namespace

@@ -210,44 +210,6 @@ TEST(HeadStoreTest, SoundsAsAtAnotherRate) {
   EXPECT_EQ(*heads.Get(48000), *heads.Get(48000));  // it is kept
 }
 
-TEST(HeadStoreTest, FilesWithoutAHeadAreRefused) {
-  const TemporaryFolder folder;
-  const auto garbage = folder / "garbage.sofa";
-  std::ofstream(garbage) << "\x89HDF\r\n\x1a\n and nothing that belongs there";
-  std::string cut(20000, '\0');
-  std::ifstream(kKemar, std::ios::binary).read(cut.data(), static_cast<std::streamsize>(20000));
-  const auto cut_off = folder / "cut.sofa";
-  std::ofstream(cut_off, std::ios::binary) << cut;
-  for (const std::string& file : {garbage.string(), cut_off.string(), std::string("/none.sofa"),
-                                  folder.path().string(), std::string("/dev/null")}) {
-    HeadStore heads(file);
-    const absl::Status refused = heads.Get(48000).status();
-    EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition) << file;
-    EXPECT_NE(refused.message().find("HEAD_UNUSABLE: the measured head " + file),
-              absl::string_view::npos)
-        << refused.message();
-  }
-  EXPECT_FALSE(HeadStore("/none.sofa").available());
-  EXPECT_TRUE(HeadStore().available());
-}
-
-TEST(HeadStoreTest, ASamplingRateInKilohertzIsRefused) {
-  std::ifstream stream(kKemar, std::ios::binary);
-  std::string file((std::istreambuf_iterator<char>(stream)), {});
-  // The file's rate of 44100 is one deflated chunk. These bytes are 48, deflated.
-  const std::array<unsigned char, 13> forty_eight = {0x78, 0xDA, 0x63, 0x60, 0x00, 0x01, 0x0F,
-                                                     0x07, 0x00, 0x00, 0xD8, 0x00, 0x89};
-  constexpr size_t kRateAt = 1173131;
-  ASSERT_EQ(file.substr(kRateAt, 4), "\x78\x01\x63\x60") << "libmysofa1 brings another file";
-  std::ranges::copy(forty_eight, file.begin() + kRateAt);
-  const TemporaryFolder folder;
-  const auto path = folder / "kilohertz.sofa";
-  std::ofstream(path, std::ios::binary) << file;
-  EXPECT_THAT(
-      std::string(HeadStore(path.string()).Get(48000).status().message()),
-      testing::HasSubstr("kilohertz.sofa has a sampling rate of 48 Hz; it must be 8000 to"));
-}
-
 TEST(HeadStoreTest, OnlyScenesOfTwoChannelsThatAskForItGetAHead) {
   HeadStore heads;
   SceneSpace space;

@@ -166,21 +166,6 @@ TEST(SceneRegistry, RegionsAreScaledByCommonFactorsOnly) {
   EXPECT_THAT(refusal(ModelOfRegions(), SmallProperties()), HasSubstr("REGION_MATERIAL_DIFFERS: "));
 }
 
-TEST(SceneRegistry, RefusesSizesAndGainsOutOfRange) {
-  Stage stage;
-  const double nan = std::nan("");
-  for (const auto& [size, gain] : std::vector<std::pair<double, double>>{
-           {-1, 1}, {1001, 1}, {nan, 1}, {1, -0.1}, {1, 1001}, {1, nan}}) {
-    ObjectProperties properties = SmallProperties();
-    properties.material.size = size;
-    properties.gain = gain;
-    const absl::Status status =
-        stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).status();
-    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << size << " " << gain;
-    EXPECT_THAT(status.ToString(), HasSubstr("INVALID_SETTINGS: "));
-  }
-}
-
 TEST(SceneRegistry, RefusesShapesAndCouplingsThatNoBodyOfTheSizeHas) {
   Stage stage;
   const auto add = [&](const ModalModel& model) {
@@ -251,21 +236,6 @@ TEST(SceneRegistry, AnObjectIsHeardFromWhereTheListenerWentWhileItWasMade) {
   const double far_peak = Peak(other.Render(20));
   EXPECT_GT(far_peak, 0);
   EXPECT_NEAR(first_peak, far_peak, 0.01 * far_peak);
-}
-
-TEST(SceneRegistry, WhatIsNotThereIsNotFound) {
-  Stage stage;
-  const auto expect = [](const absl::Status& status, const char* reason) {
-    EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
-    EXPECT_THAT(status.ToString(), HasSubstr(reason));
-  };
-  expect(stage.scenes.DeleteScene(999), "SCENE_NOT_FOUND: ");
-  expect(stage.scenes.AddObject(999, 0, SmallModel(), SmallProperties()).status(),
-         "SCENE_NOT_FOUND: ");
-  expect(stage.scenes.OpenContactStream(999, {.step_s = 0.01}).status(), "SCENE_NOT_FOUND: ");
-  expect(stage.scenes.RemoveObject(stage.scene, 7), "OBJECT_NOT_FOUND: ");
-  expect(stage.scenes.UpdateObject(stage.scene, 7, {}).status(),
-         "has no object 7, which is unknown or removed; ");
 }
 
 TEST(SceneRegistry, TheNumberOfScenesIsLimited) {
@@ -389,48 +359,6 @@ TEST(SceneRegistry, AnObjectThatRingsIsHeardWhereItGoesAndFromWhereTheListenerGo
   EXPECT_GT(render(), 1000);
 }
 
-TEST(SceneRegistry, RefusesAMoveThatTheMixerHasNoRoomFor) {
-  Stage stage;
-  const HearingSettings hearing{.distance_gain = true};
-  const uint64_t scene = *stage.scenes.CreateScene({.hearing = hearing, .listener = {}});
-  ObjectProperties properties = SmallProperties();
-  properties.pose = Pose{.position_m = {-1, 0, 0}};
-  const uint32_t handle = stage.scenes.AddObject(scene, 0, SmallModel(), properties)->handle;
-  const auto move = [&] {
-    ObjectChange change;
-    change.pose = Pose{.position_m = {1, 0, 0}};
-    return stage.scenes.UpdateObject(scene, handle, change).status();
-  };
-  absl::Status status;
-  // Nothing renders, so that nothing takes the moves.
-  for (size_t i = 0; status.ok() && i <= SceneRegistry::kMaxObjectCount; ++i) status = move();
-  EXPECT_THAT(status.ToString(), HasSubstr("TOO_MANY_MOVES: "));
-  stage.Render(1);
-  EXPECT_TRUE(move().ok());
-}
-
-TEST(SceneRegistry, RefusesPosesGlidesAndHearingsOutOfRange) {
-  Stage stage;
-  const uint32_t handle = stage.Add();
-  ObjectChange nowhere;
-  nowhere.pose = Pose{.position_m = {std::nan(""), 0, 0}};
-  ObjectChange slow;
-  slow.glide_s = 11;
-  const auto update = [&](const ObjectChange& change) {
-    return stage.scenes.UpdateObject(stage.scene, handle, change).status().ToString();
-  };
-  EXPECT_THAT(update(nowhere), HasSubstr("INVALID_POSE"));
-  EXPECT_THAT(update(slow), HasSubstr("INVALID_SETTINGS"));
-  EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {}, -1).ToString(),
-              HasSubstr("INVALID_SETTINGS"));
-  EXPECT_THAT(stage.scenes.UpdateListener(stage.scene, {.orientation = {.w = 3}}, 0).ToString(),
-              HasSubstr("INVALID_POSE"));
-  HearingSettings hearing;
-  hearing.sound_speed_m_per_s = 0;
-  EXPECT_THAT(stage.scenes.CreateScene({.hearing = hearing, .listener = {}}).status().ToString(),
-              HasSubstr("INVALID_SETTINGS"));
-}
-
 TEST(SceneRegistry, ARemovedObjectFadesOut) {
   Stage stage;
   const uint32_t handle = stage.Add();
@@ -441,15 +369,6 @@ TEST(SceneRegistry, ARemovedObjectFadesOut) {
   stage.Render(8);                         // over 10 ms
   EXPECT_THAT(stage.Render(4), Each(0.0F));
   EXPECT_EQ(stage.scenes.object_count(), 0U);
-}
-
-TEST(SceneRegistry, DeletingASceneSilencesIt) {
-  Stage stage;
-  stage.Strike(stage.Add());
-  stage.Render(4);
-  ASSERT_TRUE(stage.scenes.DeleteScene(stage.scene).ok());
-  stage.Render(9);
-  EXPECT_THAT(stage.Render(4), Each(0.0F));
 }
 
 }  // namespace

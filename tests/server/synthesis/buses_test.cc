@@ -92,13 +92,6 @@ TEST_F(BusesTest, AMutedBusRingsOnUnheard) {
   }
 }
 
-TEST_F(BusesTest, AGainThatABusBeginsWithNeedsNoGlide) {
-  const BusId quiet = mixer_.OpenBus(0.5).value();
-  Strike(mixer_.Add(MakeBank(), nullptr, quiet).value(), 0);
-  const std::vector<float> frames = Render(20);
-  for (size_t n = 0; n < frames.size(); ++n) EXPECT_NEAR(frames[n], 0.5 * Right(n, 0), 1e-6) << n;
-}
-
 TEST_F(BusesTest, WhatABusWasToldBeforeItsFirstBankHoldsAtOnce) {
   const BusId bus = mixer_.OpenBus().value();
   Render(5);
@@ -189,19 +182,6 @@ TEST_F(BusesTest, AStopEndsImpulsesThatWaitAndNoneThatComeLater) {
   const std::vector<float> frames = Render(20);
   for (size_t n = 0; n < frames.size(); ++n) {
     EXPECT_NEAR(frames[n], Right(begin + n, 8000), 1e-6) << n;
-  }
-}
-
-TEST_F(BusesTest, AStopOfOneBusIsNotHeardInOthers) {
-  const BankId other = mixer_.Add(MakeBank(), nullptr, mixer_.OpenBus().value()).value();
-  Strike(other, 0);
-  Strike(bank_, 0);
-  Render(10);
-  mixer_.Stop(bus_);
-  Render(12);
-  const std::vector<float> frames = Render(10);
-  for (size_t n = 0; n < frames.size(); ++n) {
-    EXPECT_NEAR(frames[n], Right(22 * 128 + n, 0), 1e-6) << n;
   }
 }
 

@@ -102,11 +102,6 @@ TEST(Overload, WithoutAClockNothingIsMergedOrShed) {
   EXPECT_EQ(struck.statistics.merged_count + struck.statistics.shed_count, 0u);
 }
 
-TEST(Overload, WithinTheBoundABoundChangesNoBit) {
-  const TestClock clock;
-  EXPECT_EQ(StrikeAtOnce(Bounded(clock, 0.7), 100).sound, StrikeAtOnce({}, 100).sound);
-}
-
 TEST(Overload, TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard) {
   const TestClock clock;
   // A bank of 160 lanes: 320 units a strike, 128 where it is merged, of 2.67e6 a block.
@@ -119,22 +114,6 @@ TEST(Overload, TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard) {
   const std::vector<float> by_itself = StrikeAtOnce({}, 0).sound;
   const double alone = Rms(std::span(by_itself).subspan(128));
   EXPECT_NEAR(Rms(std::span(shed.sound).subspan(128)), alone, 0.01 * alone);
-}
-
-TEST(Overload, StoppedStrikesTakeNoWorkFromThoseThatSound) {
-  const TestClock clock;
-  // 4001 strikes would be shed, see TooManyStrikesAreMergedThenShedAndTheLoudOneIsHeard.
-  Mixer mixer(Bounded(clock, 0.2));
-  const BankId bank = mixer.Add(MakeBank()).value();
-  const auto stream = mixer.OpenStream(4096).value();
-  const MixerEvent strike{.bank = bank, .frame = 128, .action = MakeUnitImpulse()};
-  for (int i = 0; i < 4000; ++i) stream->TryPush(strike);
-  std::vector<float> block(128);
-  mixer.Render(block);  // takes the strikes, which are due in the next block
-  mixer.Stop({});
-  stream->TryPush({.bank = bank, .frame = 128, .action = MakeUnitImpulse()});
-  mixer.Render(block);
-  EXPECT_EQ(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
 }
 
 TEST(Overload, MovesHoweverManyLeaveWorkForAStrike) {
@@ -231,14 +210,6 @@ TEST(Overload, ThreeHundredThousandImpulsesASecondAllSoundExactly) {
   EXPECT_EQ(stream->accepted_count(), 40'000U);
   EXPECT_EQ(stream->dropped_count(), 0U);
   EXPECT_EQ(mixer.statistics().merged_count + mixer.statistics().shed_count, 0U);
-}
-
-TEST(Overload, WithoutAClockABlockTakesAnyNumberOfImpulses) {
-  Mixer mixer;
-  const BankId bank = mixer.Add(MakeBank()).value();
-  const auto stream = mixer.OpenStream(4096).value();
-  Flood(mixer, *stream, bank, 128 * 20, 60'000);
-  EXPECT_EQ(stream->accepted_count(), 60'000U);
 }
 
 TEST(Overload, ImpulsesOnBanksOfFewModesAreMergedToo) {

@@ -100,24 +100,6 @@ TEST(StreamWriter, WritesWhatComesWhileItFindsNothing) {
   EXPECT_THAT(call.written, ElementsAre("late"));
 }
 
-TEST(StreamWriter, WritesNothingBeforeItIsStarted) {
-  MessageCall call;
-  call.Send("early");
-  EXPECT_TRUE(call.written.empty());
-  call.StartWriting();
-  EXPECT_THAT(call.written, ElementsAre("early"));
-}
-
-TEST(StreamWriter, EndsWithTheErrorOfFill) {
-  MessageCall call;
-  call.error = absl::NotFoundError("gone");
-  call.StartWriting();
-  EXPECT_THAT(call.ends, ElementsAre(grpc::NOT_FOUND));
-  call.Wake();
-  call.OnCancel();
-  EXPECT_EQ(call.ends.size(), 1U);
-}
-
 TEST(StreamWriter, EndsAtOnceWhereItIsCancelledWhileItWaits) {
   MessageCall call;
   call.StartWriting();
@@ -126,25 +108,6 @@ TEST(StreamWriter, EndsAtOnceWhereItIsCancelledWhileItWaits) {
   call.Send("too late");
   EXPECT_TRUE(call.written.empty());
   EXPECT_EQ(call.ends.size(), 1U);
-}
-
-TEST(StreamWriter, EndsAfterTheWriteDuringWhichItIsCancelled) {
-  for (const bool written : {false, true}) {
-    MessageCall call;
-    call.StartWriting();
-    call.Send("a");
-    call.OnCancel();
-    EXPECT_TRUE(call.ends.empty());
-    call.OnWriteDone(written);
-    EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
-  }
-}
-
-TEST(StreamWriter, EndsWhereItIsCancelledWhileItFindsNothing) {
-  MessageCall call;
-  call.while_filling = [&call] { call.OnCancel(); };
-  call.StartWriting();
-  EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
 }
 
 /// Takes numbers up to 2.
@@ -174,23 +137,6 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   void AllRead() override { all_read = true; }
 };
 
-TEST(StreamReader, TakesOneRequestAfterTheOther) {
-  NumberCall call;
-  call.ReceiveNext();
-  call.ReceiveNext();
-  call.OnReadDone(false);
-  EXPECT_THAT(call.taken, ElementsAre(1, 2));
-  EXPECT_TRUE(call.all_read);
-}
-
-TEST(StreamReader, EndsWithTheErrorOfTakeAndReadsNoMore) {
-  NumberCall call;
-  for (int i = 0; i < 3; ++i) call.ReceiveNext();
-  EXPECT_THAT(call.ends, ElementsAre(grpc::OUT_OF_RANGE));
-  EXPECT_EQ(call.read_count, 3);
-  EXPECT_FALSE(call.all_read);
-}
-
 TEST(StreamReader, RefusesAMessageThatCannotBeParsedInsteadOfTakingItForTheEnd) {
   for (const int read_before : {0, 2}) {
     NumberCall call;
@@ -209,14 +155,6 @@ TEST(StreamReader, TakesNothingMoreFromAClientThatHasGone) {
   call.ReceiveNext();
   EXPECT_THAT(call.taken, ElementsAre(1));
   EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
-}
-
-TEST(StreamReader, EndsWithAnErrorWhereMemoryIsMissing) {
-  NumberCall call;
-  call.throws = true;
-  call.ReceiveNext();
-  call.ReceiveNext();
-  EXPECT_THAT(call.ends, ElementsAre(grpc::RESOURCE_EXHAUSTED));
 }
 
 }  // namespace

@@ -152,18 +152,6 @@ TEST(Columns, AColumnOfAnotherLengthRejectsAllImpulsesAndIsNamed) {
   });
 }
 
-TEST(Columns, AColumnOfPosesOfAnotherLengthRejectsAllAndIsNamed) {
-  v1::ContactStep step = TwoPoses();
-  step.mutable_poses()->add_orientation(0);
-  const Told turned = Read(step);
-  EXPECT_EQ(turned.rejected_count, 2U);
-  EXPECT_THAT(turned.rejection, HasSubstr("CONTACT_MALFORMED: the column orientation has 9"));
-  step.mutable_poses()->add_position_m(0);
-  EXPECT_THAT(Read(step).rejection, HasSubstr("the column position_m has 7"));
-  step.mutable_poses()->clear_object();
-  EXPECT_EQ(Read(step).rejected_count, 1U);
-}
-
 TEST(Columns, ARejectionNamesItsRowUnlessThereIsOneOnly) {
   v1::ContactStep step = ThreeImpulses();
   EXPECT_THAT(Read(step).rejection, HasSubstr("OBJECT_NOT_FOUND: impacts[2]: an empty scene has "
@@ -199,28 +187,6 @@ TEST(Rows, NeedTheVectorOfTheirKind) {
     EXPECT_THAT(Read(Row(kind, is_force, !is_force)).rejection, HasSubstr("CONTACT_MALFORMED"));
     EXPECT_THAT(Read(Row(kind, false, false)).rejection, HasSubstr("CONTACT_MALFORMED"));
   }
-}
-
-TEST(Contacts, OfAKindThatThisDaemonDoesNotKnowAreRejected) {
-  const auto unknown = static_cast<v1::ContactKind>(9);
-  EXPECT_THAT(Read(Row(unknown, true, false)).rejection, HasSubstr("knows no kind 9"));
-  v1::ContactStep step = ThreeImpulses();
-  step.mutable_contact_columns(0)->set_kind(unknown);
-  EXPECT_EQ(Read(step).rejected_count, 5U);
-}
-
-TEST(Columns, WithTheVectorsOfAnotherKindAreRejected) {
-  v1::ContactStep step = ThreeImpulses();
-  v1::ContactColumns& columns = *step.mutable_contact_columns(0);
-  columns.set_kind(v1::CONTACT_KIND_FORCE);
-  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: contact forces have"));
-  columns.mutable_force_newtons()->Swap(columns.mutable_impulse_newton_seconds());
-  EXPECT_TRUE(Validate(columns).ok());
-  ObjectForce force;
-  ReadRow(columns, 0, force);
-  EXPECT_EQ(force.contact.impulse.impulse_newton_seconds, (Vector3{4, 5, 6}));
-  columns.set_kind(v1::CONTACT_KIND_REPORTED);
-  EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: contacts with impulses"));
 }
 
 TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {

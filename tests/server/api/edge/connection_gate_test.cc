@@ -194,16 +194,6 @@ TEST_F(ConnectionGateTest, EndsAConnectionWhoseDescriptorHasGoneToAnotherFile) {
   EXPECT_EQ(recv(keeper_->newest, &byte, 1, 0), 1);
 }
 
-TEST_F(ConnectionGateTest, TellsOfAConnectionThatComesWhileNoOtherIsOpen) {
-  Open(4);
-  for (int i = 0; i < 2; ++i) {
-    Connect();
-    taken_.acquire();
-  }
-  EXPECT_EQ(first_count_, 1);
-  close(keeper_->newest);
-}
-
 TEST_F(ConnectionGateTest, ConnectionsThatHaveEndedTakeNoMemory) {
   Open(100000);
   const auto allocated_after = [this](int count) {
@@ -239,63 +229,6 @@ TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) 
                           "share (--client-share) of 8; ")));
 }
 
-TEST_F(ConnectionGateTest, SaysOnceThatNoDescriptorIsLeftAndAcceptsAgainLater) {
-  Open(8);
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
-  // UBSan opens a pipe at the first virtual call of each kind, which would fail without
-  // descriptors.
-  log_.Warn("before");
-  ASSERT_TRUE(logged_.try_acquire());
-  // Standard input, output and error are in use.
-  const rlimit none{.rlim_cur = 3, .rlim_max = before.rlim_max};
-  const int client = Socket();
-  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
-  Connect(client, 1);
-  ASSERT_TRUE(logged_.try_acquire_for(std::chrono::seconds(30)));
-  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
-  taken_.acquire();
-  gate_.reset();
-  EXPECT_THAT(
-      lines_,
-      testing::ElementsAre(
-          "before",
-          testing::AllOf(testing::StartsWith("cannot accept connections (Too many open files)"),
-                         testing::HasSubstr("LimitNOFILE="))));
-}
-
-TEST_F(ConnectionGateTest, SaysOnceThatItsSocketWasRemovedOrReplaced) {
-  const TemporaryFolder folder;
-  const std::string path = (folder / "socket").string();
-  Open(8, 1, [&path](ConnectionGate& gate) {
-    ListenAddress address = *ParseListenAddress("unix:" + path);
-    std::counting_semaphore<> taken{0};
-    return gate.Listen(address, std::make_unique<Keeper>(taken));
-  });
-  std::filesystem::remove(path);
-  WriteBytes(path, "");
-  for (int i = 0; i < 2; ++i) gate_->LookAtSocketFiles();
-  gate_.reset();
-  EXPECT_THAT(lines_, testing::ElementsAre(testing::AllOf(
-                          testing::StartsWith("somebody removed or replaced the socket " + path),
-                          testing::HasSubstr("restart the daemon"))));
-  EXPECT_TRUE(std::filesystem::exists(path)) << "the file of another must stay";
-}
-
-TEST_F(ConnectionGateTest, TheLastPlacesAreForAddressesWithFewConnections) {
-  Open(32);
-  for (int i = 0; i < 30; ++i) {
-    Connect();
-    taken_.acquire();
-  }
-  ExpectRefusal(Connect());
-  for (int i = 0; i < 2; ++i) {
-    Connect(2);
-    taken_.acquire();
-  }
-  ExpectRefusal(Connect(3));
-}
-
 TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   Open(4);
   const int first = Connect();
@@ -312,31 +245,11 @@ TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   EXPECT_TRUE(gate_->IsOpen(NameOf(first)));
 }
 
-TEST_F(ConnectionGateTest, WhatAnEndedConnectionHasSentIsNoLongerRead) {
-  Open(1);
-  const int made = Connect();
-  taken_.acquire();
-  const std::string sent(1000, 'x');
-  ASSERT_EQ(send(made, sent.data(), sent.size(), 0), static_cast<ssize_t>(sent.size()));
-  char received = 0;
-  // The data has come before the connection is ended.
-  ASSERT_EQ(recv(keeper_->newest, &received, 1, MSG_PEEK | MSG_WAITALL), 1);
-  EXPECT_TRUE(gate_->End(NameOf(made)));
-  EXPECT_EQ(recv(keeper_->newest, &received, 1, 0), 0);
-}
-
 TEST(SourceOfPeer, IsOneForAllConnectionsOfAProcessOrAddress) {
   EXPECT_EQ(SourceOfPeer("unix:pid-7/1"), SourceOfPeer("unix:pid-7/2"));
   EXPECT_NE(SourceOfPeer("unix:pid-7/1"), SourceOfPeer("unix:pid-71/1"));
   EXPECT_EQ(SourceOfPeer("ipv4:127.0.0.1:1"), SourceOfPeer("ipv4:127.0.0.2:2"));
   EXPECT_NE(SourceOfPeer("ipv4:192.0.2.1:1"), SourceOfPeer("ipv4:192.0.2.2:1"));
-}
-
-TEST_F(ConnectionGateTest, RefusesAPortThatIsInUse) {
-  Open(1);
-  ConnectionGate second(1);
-  const absl::Status status = second.Listen(address_, std::make_unique<Keeper>(taken_));
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("LISTEN_FAILED: "));
 }
 
 TEST_F(ConnectionGateTest, AUnixSocketIsItsOwnersUnlessOnlyAGroupMayEnterItsFolder) {

@@ -16,10 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ConnectionCalls, CallsThatEndWhileTheyAreCountedAreNotOpen) {
-  EXPECT_EQ((ConnectionCalls{.begun_count = 7, .answered_count = 8}.open_count()), 0U);
-}
-
 TEST(AllowedBytes, GrowWithWhatWasReceivedAndWithTime) {
   EXPECT_EQ(AllowedBytes(0, 0), 0U);
   EXPECT_EQ(AllowedBytes(6400, 10), 100 + 10'240U);

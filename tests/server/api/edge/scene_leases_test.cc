@@ -48,29 +48,6 @@ TEST_F(SceneLeasesTest, ASceneEndsAGraceAfterItsLastConnectionWasClosed) {
   EXPECT_THAT(leases_.Expired(), ElementsAre(1));
 }
 
-TEST_F(SceneLeasesTest, AClientThatComesBackWithinTheGraceKeepsItsScene) {
-  leases_.Begin(1, "a", false);
-  open_.clear();
-  EXPECT_THAT(leases_.Expired(), IsEmpty());
-  clock_.now += seconds(59);
-  open_.insert("again");
-  leases_.Use(1, "again");
-  clock_.now += seconds(1000);
-  EXPECT_THAT(leases_.Expired(), IsEmpty());
-  EXPECT_FALSE(leases_.StateOf(1).ends_in_s);
-}
-
-TEST_F(SceneLeasesTest, ASceneThatIsKeptLastsWithoutConnections) {
-  leases_.Begin(1, "a", true);
-  open_.clear();
-  EXPECT_THAT(leases_.Expired(), IsEmpty());
-  clock_.now += seconds(1000);
-  EXPECT_THAT(leases_.Expired(), IsEmpty());
-  EXPECT_FALSE(leases_.LongestAbandoned([](uint64_t) { return true; }));
-  EXPECT_TRUE(leases_.StateOf(1).keep);
-  EXPECT_FALSE(leases_.StateOf(1).ends_in_s);
-}
-
 TEST_F(SceneLeasesTest, TheLongestAbandonedSceneMakesRoomFirst) {
   const auto any = [](uint64_t) { return true; };
   leases_.Begin(1, "a", false);
@@ -105,18 +82,6 @@ TEST(ClientLimits, AClientHasAShareOfTheWholeAndGivesItBack) {
   EXPECT_EQ(limits.count(Holding::kRendering), 1U);
 }
 
-TEST(ClientLimits, UploadsOfAllClientsTogetherAreBounded) {
-  ClientLimits limits(0.5);
-  std::vector<ClientPlace> places;
-  for (size_t i = 0; i < kMaxUploadCount; ++i) {
-    places.push_back(*limits.Take(Holding::kUpload, std::to_string(i)));
-  }
-  EXPECT_THAT(limits.Take(Holding::kUpload, "late").status().ToString(),
-              testing::HasSubstr("TOO_MANY_CALLS"));
-  places.pop_back();
-  EXPECT_TRUE(limits.Take(Holding::kUpload, "late").ok());
-}
-
 TEST(ClientLimits, TheMemoryOfAllRenderingsIsBounded) {
   constexpr Holding kMib = Holding::kRenderingMib;
   ClientLimits limits(0.5);
@@ -134,11 +99,6 @@ TEST(ClientLimits, TheMemoryOfAllRenderingsIsBounded) {
   first = ClientPlace();
   EXPECT_TRUE(third.Grow(2).ok());
   EXPECT_EQ(limits.count(kMib), half + 2);
-}
-
-TEST(ClientLimits, TheSmallestShareIsOne) {
-  EXPECT_EQ(ClientLimits::ShareOf(8, 0.001), 1U);
-  EXPECT_EQ(ClientLimits::ShareOf(8, 1), 8U);
 }
 
 }  // namespace

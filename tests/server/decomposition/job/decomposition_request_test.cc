@@ -93,16 +93,6 @@ TEST(DecompositionRequest, ModelsKeepTheirNames) {
   EXPECT_EQ(Digest(request), "9bb5c442dd49d749643201224c506c4c70d09f90edff823058d4213708f5b0ac");
 }
 
-TEST(DecompositionRequest, WhatIsLeftOutMeansTheDefault) {
-  Request given = Aluminum();
-  v1::DecompositionSettings& settings = *given.mutable_settings();
-  settings.set_poisson_ratio(ResolveRequest(Aluminum())->material().poisson_ratio());
-  settings.set_element(v1::ELEMENT_QUADRATIC);
-  settings.set_mass_matrix(v1::MASS_MATRIX_CONSISTENT);
-  settings.set_metres_per_unit(1);
-  EXPECT_EQ(Digest(given), Digest(Aluminum()));
-}
-
 TEST(DecompositionRequest, PoissonsRatioIsRoundedToOneInTenThousand) {
   const auto digest = [](double poisson) {
     Request request = Aluminum();
@@ -112,18 +102,6 @@ TEST(DecompositionRequest, PoissonsRatioIsRoundedToOneInTenThousand) {
   EXPECT_EQ(digest(0.33), digest(0.330049));
   EXPECT_NE(digest(0.33), digest(0.330051));
   EXPECT_NE(digest(0.33), digest(-0.33));
-}
-
-TEST(DecompositionRequest, HintsAndLabelAreNoPartOfTheName) {
-  Request request = Aluminum();
-  request.mutable_settings()->set_poisson_ratio(0.3);
-  const std::string digest = Digest(request);
-  request.mutable_material()->set_young_pa(1e9);
-  request.set_size(3);
-  request.set_min_frequency_hz(50);
-  request.set_max_frequency_hz(5000);
-  request.set_label("bell");
-  EXPECT_EQ(Digest(request), digest);
 }
 
 TEST(DecompositionRequest, EverySettingIsPartOfTheName) {
@@ -209,14 +187,6 @@ TEST(DecompositionRequest, RefusesWhatCannotBeComputed) {
   EXPECT_THAT(refusal([](Request& r) { r.set_size(-1); }), HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(refusal([](Request& r) { r.set_max_frequency_hz(10); }),
               HasSubstr("INVALID_SETTINGS"));
-}
-
-TEST(DecompositionRequest, ALongLabelIsCutAfterAWholeCharacter) {
-  Request request = Aluminum();
-  request.set_label(absl::StrCat(std::string(199, 'x'), "\u00e4"));
-  const auto resolved = ResolveRequest(request);
-  ASSERT_TRUE(resolved.ok()) << resolved.status();
-  EXPECT_EQ(resolved->label(), std::string(199, 'x'));
 }
 
 }  // namespace

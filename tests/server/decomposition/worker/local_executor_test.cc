@@ -20,7 +20,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
-using ::testing::Not;
 
 constexpr std::chrono::seconds kDeadline(30);
 
@@ -119,21 +118,6 @@ TEST_F(LocalExecutorTest, RunsTheWorkerNicedAndNoisyStreamsHarmless) {
   EXPECT_EQ(run_.model, "5\n");
 }
 
-TEST_F(LocalExecutorTest, RunsATransferAtALowerPriorityThanADecomposition) {
-  radiates_ = true;
-  EXPECT_EQ(RunScript("nice >\"$out\"").verdict, Verdict::kOk);
-  EXPECT_EQ(run_.model, "10\n");
-}
-
-TEST_F(LocalExecutorTest, KeepsAndRevealsNothingOfAMesh) {
-  std::filesystem::create_directory(folder_ / "running");
-  WriteBytes(folder_ / "running/left-over", "of a daemon that was killed");
-  RunScript("stat -c %a \"$here/running\" >\"$out\"");
-  EXPECT_EQ(run_.model, "700\n");
-  executor_.reset();
-  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "running"));
-}
-
 TEST_F(LocalExecutorTest, PassesProgressOnAndNeverLetsItGoBack) {
   WriteEvents(ProgressBytes(0.5) + ProgressBytes(0.25) + ProgressBytes(-1) +
               ProgressBytes(std::numeric_limits<double>::quiet_NaN()) + ProgressBytes(7));
@@ -146,16 +130,6 @@ TEST_F(LocalExecutorTest, TellsARefusalFromOtherEnds) {
   const Outcome outcome = RunScript("cat \"$here/events\" >&3; exit 2");
   EXPECT_EQ(outcome.verdict, Verdict::kBadInput);
   EXPECT_EQ(outcome.error.reason(), "MESH_NOT_CLOSED");
-}
-
-TEST_F(LocalExecutorTest, AWorkerThatReportsTooLittleMemoryRanOutOfMemory) {
-  WriteEvents(ErrorBytes("OUT_OF_MEMORY"));
-  EXPECT_EQ(RunScript("cat \"$here/events\" >&3; exit 2").verdict, Verdict::kOutOfMemory);
-}
-
-TEST_F(LocalExecutorTest, AWorkerThatCannotWriteIsNoRefusal) {
-  WriteEvents(ErrorBytes("OUTPUT_NOT_WRITABLE"));
-  EXPECT_EQ(RunScript("cat \"$here/events\" >&3; exit 2").verdict, Verdict::kCrashed);
 }
 
 TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
@@ -171,19 +145,6 @@ void ExpectKilled(const Outcome& outcome, Verdict verdict, const std::string& me
   EXPECT_TRUE(outcome.killed);
   EXPECT_EQ(outcome.verdict, verdict);
   EXPECT_THAT(outcome.error.message(), HasSubstr(message));
-}
-
-TEST_F(LocalExecutorTest, ASignalFromOutsideIsNoFaultOfTheMesh) {
-  const Outcome outcome = RunScript("kill -TERM $$");
-  ExpectKilled(outcome, Verdict::kCrashed, "ended by signal 15 from outside");
-  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-  EXPECT_THAT(outcome.error.message(), Not(HasSubstr("mesh")));
-}
-
-TEST_F(LocalExecutorTest, AnExitStatusWithoutAReasonIsACrash) {
-  const Outcome outcome = RunScript("exit 3");
-  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_THAT(outcome.error.message(), HasSubstr("exit status 3"));
 }
 
 TEST_F(LocalExecutorTest, AKillIsTheKernelsForLackOfMemoryIfTheKernelSaysSo) {
@@ -203,14 +164,6 @@ TEST_F(LocalExecutorTest, AKillWithoutALackOfMemoryIsSomebodyElses) {
   EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
 }
 
-TEST_F(LocalExecutorTest, AKillNamesBothCausesIfTheKernelDoesNotCount) {
-  options_.kernel_counts = folder_ / "vmstat";
-  const Outcome outcome = RunScript("kill -KILL $$");
-  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-  EXPECT_THAT(outcome.error.message(),
-              HasSubstr("signal 9 from outside, by the kernel for lack of memory or by somebody"));
-}
-
 TEST_F(LocalExecutorTest, KillsAWorkerThatTakesTooMuchMemory) {
   options_.memory_limit_bytes = 100 << 20;
   // Doubled until it is killed.
@@ -226,13 +179,6 @@ TEST_F(LocalExecutorTest, TheRequestsOwnLimitsBindWhereTheyAreLower) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("50 MiB"));
   EXPECT_GT(outcome.peak_bytes, 50U << 20);
   EXPECT_FALSE(outcome.crowded);
-}
-
-TEST_F(LocalExecutorTest, TheRequestsTimeLimitBinds) {
-  request_.set_time_limit_s(0.2);
-  const Outcome outcome = RunScript("sleep 1000");
-  EXPECT_EQ(outcome.verdict, Verdict::kTimeout);
-  EXPECT_THAT(outcome.error.message(), HasSubstr("more than its 0.2 s"));
 }
 
 TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
@@ -350,21 +296,6 @@ TEST_F(LocalExecutorTest, KillsAWorkerThatLivesButNeverEnds) {
             Verdict::kTimeout);
 }
 
-TEST_F(LocalExecutorTest, KillsAWorkerThatWritesGarbage) {
-  const Outcome outcome = RunScript(R"(printf '\377\377\377\377\377\377' >&3; sleep 1000)");
-  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-}
-
-TEST_F(LocalExecutorTest, KillsAWorkerThatFloodsItsPipe) {
-  std::string events;
-  for (int i = 0; i < 10'000; ++i) events += ProgressBytes(0.5);
-  WriteEvents(events);
-  const Outcome outcome = RunScript("while :; do cat \"$here/events\" >&3; done");
-  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
-  EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
-}
-
 TEST_F(LocalExecutorTest, CancelsARunningWorker) {
   WriteEvents(ProgressBytes(0.5));
   MakeExecutor("cat \"$here/events\" >&3; sleep 1000");
@@ -386,16 +317,6 @@ TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
        .on_progress = [](const v1::Progress&) {},
        .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});
   EXPECT_EQ(ended.get_future().get().error.reason(), "DATABASE_CORRUPT");
-}
-
-TEST_F(LocalExecutorTest, MakesItsFolderAnewIfSomebodyHasRemovedIt) {
-  MakeExecutor("echo 1 >\"$out\"");
-  std::filesystem::remove_all(options_.directory);
-  Start(run_);
-  ASSERT_TRUE(Happens(run_.ended));
-  EXPECT_EQ(run_.outcome.verdict, Verdict::kOk) << run_.outcome.error.message();
-  EXPECT_EQ(std::filesystem::status(options_.directory).permissions(),
-            std::filesystem::perms::owner_all);
 }
 
 TEST_F(LocalExecutorTest, ItsDestructionKillsWhatRunsWithoutAWord) {
@@ -422,13 +343,6 @@ TEST_F(LocalExecutorTest, WorkersDieWithTheDaemonHoweverItDies) {
   kill(daemon, SIGKILL);
   ASSERT_EQ(waitpid(daemon, nullptr, 0), daemon);
   EXPECT_TRUE(life.LosesItsWriters());
-}
-
-TEST_F(LocalExecutorTest, AProgramThatCannotBeExecutedIsRefused) {
-  options_.program = folder_ / "missing";
-  options_.directory = folder_ / "running";
-  EXPECT_THAT(MakeLocalExecutor(options_, clock_).status().ToString(),
-              HasSubstr("WORKER_NOT_FOUND"));
 }
 
 }  // namespace

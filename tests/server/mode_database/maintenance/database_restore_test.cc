@@ -81,19 +81,6 @@ class DatabaseRestoreTest : public ::testing::Test {
   SystemClock clock_;
 };
 
-TEST_F(DatabaseRestoreTest, EveryDatabaseThatWasReplacedIsKept) {
-  Put(file_, "first");
-  for (const char* name : {"second", "third"}) {
-    const path copy = folder_ / name;
-    Put(copy, name);
-    const auto kept = RestoreDatabase(file_, copy);
-    ASSERT_TRUE(kept.ok()) << kept.status();
-  }
-  EXPECT_THAT(Labels(file_), ElementsAre("third"));
-  EXPECT_THAT(Labels(folder_ / "carillon.db.replaced"), ElementsAre("first"));
-  EXPECT_THAT(Labels(folder_ / "carillon.db.replaced-2"), ElementsAre("second"));
-}
-
 TEST_F(DatabaseRestoreTest, ADatabaseIsRestoredWithItsLog) {
   Put(file_, "old");
   CopyWithLog("copy");
@@ -111,26 +98,6 @@ TEST_F(DatabaseRestoreTest, TheNewDatabaseDoesNotGetTheLogOfTheOld) {
   EXPECT_THAT(Names(), Not(Contains(testing::AnyOf("carillon.db-wal", "carillon.db-shm"))));
   EXPECT_THAT(Labels(file_), ElementsAre("new"));
   EXPECT_THAT(Labels(*kept), ElementsAre("in the log"));
-}
-
-TEST_F(DatabaseRestoreTest, AKeptDatabaseNeverGetsTheLogOfAnother) {
-  Put(file_, "old");
-  Put(folder_ / "copy", "new");
-  std::ofstream(folder_ / "carillon.db.replaced-wal") << "of another";
-  const auto kept = RestoreDatabase(file_, folder_ / "copy");
-  ASSERT_TRUE(kept.ok()) << kept.status();
-  EXPECT_EQ(kept->filename(), "carillon.db.replaced-2");
-  EXPECT_THAT(Labels(*kept), ElementsAre("old"));
-}
-
-TEST_F(DatabaseRestoreTest, ALogThatIsLeftAloneIsKeptUnderAPrintedName) {
-  Put(folder_ / "copy", "new");
-  std::ofstream(folder_ / "carillon.db-wal") << "a log";
-  const auto kept = RestoreDatabase(file_, folder_ / "copy");
-  ASSERT_TRUE(kept.ok()) << kept.status();
-  EXPECT_EQ(kept->filename(), "carillon.db.replaced");
-  EXPECT_TRUE(std::filesystem::exists(kept->string() + "-wal"));
-  EXPECT_THAT(Labels(file_), ElementsAre("new"));
 }
 
 TEST_F(DatabaseRestoreTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) {
@@ -182,57 +149,6 @@ TEST_F(DatabaseRestoreTest, ARestoreFollowsLinksToItsFiles) {
   EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
               HasSubstr("it is a symbolic link that leads to no file"));
   EXPECT_TRUE(std::filesystem::is_symlink(file_));
-}
-
-/// Makes a file immutable, or takes that back. Returns whether this user and the file system can.
-bool SetImmutable(const path& file, bool immutable) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  int flags = 0;
-  bool can = ioctl(descriptor, FS_IOC_GETFLAGS, &flags) == 0;
-  flags = immutable ? flags | FS_IMMUTABLE_FL : flags & ~FS_IMMUTABLE_FL;
-  can = can && ioctl(descriptor, FS_IOC_SETFLAGS, &flags) == 0;
-  close(descriptor);
-  return can;
-}
-
-TEST_F(DatabaseRestoreTest, AnImmutableFileOfTheOldDatabaseKeepsItInPlace) {
-  Put(folder_ / "copy", "new");
-  for (const char* name : {"carillon.db", "carillon.db-wal", "carillon.db-shm"}) {
-    Put(file_, "old");
-    { const std::ofstream empty(folder_ / name, std::ios::app); }
-    if (!SetImmutable(folder_ / name, true)) GTEST_SKIP() << "no file can be made immutable here";
-    const std::string error = RestoreDatabase(file_, folder_ / "copy").status().ToString();
-    ASSERT_TRUE(SetImmutable(folder_ / name, false));
-    EXPECT_THAT(error, HasSubstr(std::string(name) + " cannot be copied or replaced")) << name;
-    EXPECT_THAT(Names(), Not(Contains(HasSubstr("replace")))) << name;
-    EXPECT_THAT(Names(), Not(Contains(HasSubstr("unfinished")))) << name;
-    EXPECT_THAT(Labels(file_), ElementsAre("old")) << name;
-  }
-}
-
-TEST_F(DatabaseRestoreTest, WhatAKilledRestoreHasCopiedIsRemovedByTheNext) {
-  Put(file_, "old");
-  Put(folder_ / "copy", "new");
-  for (const char* name : {"restore", "restore-wal"}) {
-    std::ofstream(UnfinishedCopy(file_, name)) << "a part";
-  }
-  std::ofstream(folder_ / "carillon.db.incoming") << "an operator's file";
-  ASSERT_TRUE(RestoreDatabase(file_, folder_ / "copy").ok());
-  EXPECT_THAT(Names(), Not(Contains(HasSubstr("-unfinished-"))));
-  EXPECT_THAT(Names(), Contains("carillon.db.incoming"));
-  EXPECT_THAT(Labels(file_), ElementsAre("new"));
-}
-
-TEST_F(DatabaseRestoreTest, ABackupOfATruncatedDatabaseIsRefused) {
-  Put(file_, "model");
-  const auto database = *ModeDatabase::Open(file_, clock_);
-  const auto back_up = [&] {
-    return BackUp(database->database(), folder_ / "copy", [] { return true; }).ToString();
-  };
-  EXPECT_EQ(back_up(), "OK");
-  std::filesystem::remove(folder_ / "copy");
-  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
-  EXPECT_THAT(back_up(), HasSubstr("DATABASE_CORRUPT: "));
 }
 
 }  // namespace

@@ -260,14 +260,6 @@ TEST_F(OfflineRendererTest, TakesNoMemoryForALongSilence) {
   EXPECT_EQ(renderer->summary().accepted_count, 2U);
 }
 
-TEST_F(OfflineRendererTest, FrameZeroIsSimulationTimeZero) {
-  const auto renderer = Make();
-  StrikeAt(*renderer, 0.125, SmallImpulse(1));
-  const std::vector<float> sound = RenderAll(*renderer, 8);
-  const auto onset = std::ranges::find_if(sound, [](float x) { return x != 0; });
-  EXPECT_EQ(onset - sound.begin(), 0.125 * kRate + 1);  // sin(0) is silent
-}
-
 TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80Db) {
   const auto renderer = Make();
   StrikeAt(*renderer, 0, SmallImpulse(1));
@@ -334,26 +326,6 @@ TEST_F(OfflineRendererTest, TellsBlowsFromItsFirstFrameAndOnTheSurface) {
   EXPECT_NEAR(blow.point_m[0], 0.1, 1e-6);
   EXPECT_NEAR(blow.point_m[1], 0.1, 1e-6);
   EXPECT_FLOAT_EQ(blow.impulse_newton_seconds[0], 0.5F);
-}
-
-TEST_F(OfflineRendererTest, TellsNoBlowsUnlessAsked) {
-  const auto renderer = Make();
-  StrikeAt(*renderer, 0, SmallImpulse(1));
-  RenderAll(*renderer, 8);
-  EXPECT_TRUE(renderer->forward().TakeBlows().empty());
-}
-
-TEST_F(OfflineRendererTest, RefusesSettingsOutOfRange) {
-  for (const OfflineSettings& settings : std::vector<OfflineSettings>{
-           {.sample_rate_hz = 7999}, {.sample_rate_hz = 192001}, {.tail_s = -1}, {.tail_s = 121}}) {
-    EXPECT_THAT(OfflineRenderer::Make(settings, bodies_).status().ToString(),
-                HasSubstr("INVALID_SETTINGS: "));
-  }
-}
-
-TEST_F(OfflineRendererTest, RefusesTwoObjectsOfOneHandle) {
-  EXPECT_THAT(Make()->forward().AddObject(1, model_, SmallProperties()).ToString(),
-              HasSubstr("OBJECT_EXISTS: "));
 }
 
 TEST_F(OfflineRendererTest, AnImpactInOneStepSoundsAsLoudAsOneThatAnEngineSpreadsOverMoreSteps) {

@@ -161,29 +161,6 @@ TEST_P(OnEveryTarget, MergedStrikesSoundAtTheirMeanTimeWhateverCameBefore) {
   }
 }
 
-TEST(OscillatorBankStrikes, MergedStrikesThatAreNotFiniteLeaveItAsItWas) {
-  const SoundingModes sounding = MakeWideModes();
-  OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
-      fresh(sounding, MakeUniformShapes(37), {});
-  SurfaceImpulse impulse = MakeUnitImpulse();
-  impulse.impulse_newton_seconds[0] = std::numeric_limits<float>::infinity();
-  const MixerEvent event{.action = impulse};
-  const DueEvent merged[] = {{.offset = 8, .merged = true, .event = &event},
-                             {.offset = 9, .merged = true, .event = &event}};
-  std::vector<float> block(128), right(128);
-  TestMix test, fresh_test;
-  BlockMix &mix = test.Begin(), &fresh_mix = fresh_test.Begin();
-  // As many as fit: one more would render what is there first.
-  for (size_t i = 0; i < StrikeBatch::kMostStrikes; ++i) {
-    bank.Strike(MakeUnitImpulse(), 5, 0, mix);
-    fresh.Strike(MakeUnitImpulse(), 5, 0, fresh_mix);
-  }
-  EXPECT_FALSE(bank.StrikeMerged(merged, mix));
-  test.Render(bank, block);
-  fresh_test.Render(fresh, right);
-  EXPECT_EQ(block, right);
-}
-
 TEST(OscillatorBankStrikes, ARefusedImpulseLeavesABankThatRingsBySpectrumAsItWas) {
   const SoundingModes sounding{.modes = {MakeMode(0, 440, -1)}};
   OscillatorBank bank(sounding, MakeUniformShapes(1), {}),
@@ -205,21 +182,6 @@ TEST(OscillatorBankStrikes, ARefusedImpulseLeavesABankThatRingsBySpectrumAsItWas
     EXPECT_EQ(block, right) << number;
   }
   EXPECT_GT(Rms(right), 0);
-}
-
-TEST(OscillatorBankStrikes, AForceThatIsNotFiniteLeavesASilentBankAsItWas) {
-  const SoundingModes sounding = MakeWideModes();
-  OscillatorBank bank(sounding, MakeUniformShapes(37), {}),
-      fresh(sounding, MakeUniformShapes(37), {});
-  TestMix test;
-  std::vector<float> block(128);
-  BlockMix& mix = test.Begin();
-  EXPECT_TRUE(bank.AddForce({.at = MakeUnitImpulse().at,
-                             .force_newtons = {std::numeric_limits<float>::infinity(), 0, 0}}));
-  EXPECT_FALSE(bank.ApplyKnot({.step_s = 0.01F}, 50, mix));
-  EXPECT_TRUE(bank.silent());
-  test.Finish(block);
-  EXPECT_EQ(Ring(bank, MakeUnitImpulse(), 1024, 5), Ring(fresh, MakeUnitImpulse(), 1024, 5));
 }
 
 TEST(OscillatorBankStrikes, AGaussianContactIsTheConvolutionWithAGaussian) {

@@ -45,19 +45,6 @@ TEST(DopplerTest, FindsTheDelayOfFastObjectsFromAPoorEstimate) {
   }
 }
 
-TEST(DopplerTest, DelaysStayWithinTheirLimits) {
-  EXPECT_EQ(FindSoundPath(Moving(0, 0), {}, kLimits, 0).delay_frames, kLimits.least_frames);
-  EXPECT_EQ(FindSoundPath(Moving(1e6, 0), {}, kLimits, 0).delay_frames, kLimits.most_frames);
-}
-
-TEST(DopplerTest, AFilledPastIsThePositionItself) {
-  PastPositions positions = Moving(50, 10);
-  positions.Fill({1, 2, 3});
-  for (const double blocks : {0.0, 0.5, 17.25, 1e3}) {
-    EXPECT_EQ(positions.Before(blocks), (Vector3{1, 2, 3}));
-  }
-}
-
 TEST(DopplerTest, TheCurveJoinsTheDelaysWithoutAKink) {
   const DelayCurve first({100, 110, 125, 130}), second({110, 125, 130, 128});
   EXPECT_DOUBLE_EQ(first.At(0), 110);

@@ -88,27 +88,6 @@ TEST_F(AccessTableFile, TwoLinesThatContradictEachOtherAreNamed) {
   EXPECT_EQ(table->FindToken("next")->name, "robot");
 }
 
-TEST_F(AccessTableFile, AControlCharacterIsNamed) {
-  const std::string credential = " strike sha256:" + Sha256Hex("secret") + "\n";
-  for (const char wrong : {'\0', '\x1b', '\x7f', '\r'}) {
-    EXPECT_THAT(Read("#\n" + std::string("ro") + wrong + "bot" + credential).status().ToString(),
-                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("line 2: "),
-                               HasSubstr("control character, byte 0x")))
-        << static_cast<int>(wrong);
-  }
-  EXPECT_TRUE(Read("robot" + credential.substr(0, credential.size() - 1) + "\r\n").ok());
-}
-
-TEST_F(AccessTableFile, AByteOrderMarkIsNamed) {
-  for (const std::string& line :
-       {"robot strike sha256:" + Sha256Hex("secret"), std::string("# callers"), std::string()}) {
-    EXPECT_THAT(Read("\xEF\xBB\xBF" + line + "\n").status().ToString(),
-                testing::AllOf(HasSubstr("ACCESS_FILE_UNUSABLE: "), HasSubstr("access line 1: "),
-                               HasSubstr("without a byte order mark")))
-        << line;
-  }
-}
-
 TEST(AccessTable, WithoutAFileAnybodyMayDoAllButAdminister) {
   const AccessTable table = AccessTable::ForThisMachine();
   for (const Role role : {Role::kAny, Role::kListen, Role::kStrike, Role::kSubmit}) {
