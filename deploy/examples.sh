@@ -8,7 +8,7 @@
 # Installs what is missing, builds, simulates the example NAME (blocks, boxes, letters, bowl, wooden_bowl, bunnies or
 # chimes) in the engine, and leaves its contact trace, sound, spectrogram, spectrum and video in
 # build/release/examples. With `clips` it simulates N random falls in MuJoCo, and leaves their sounds and a manifest in
-# build/release/examples/clips (docs/clips.md). With `gallery` it makes the sounds and pictures of docs/ again
+# build/release/examples/clips (docs/clips.md). With `gallery` it makes the sounds, pictures and film of docs/ again
 # (client_sdk/examples/falls/gallery.py). The programs are in client_sdk/examples.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -26,9 +26,9 @@ if [[ $1 == clips ]]; then
   run=(/usr/bin/python3 "$root/client_sdk/examples/falls/clips.py")
 elif [[ $1 == gallery ]]; then
   shift
-  lists+=(videos)
   run=(/usr/bin/python3 "$root/client_sdk/examples/falls/gallery.py")
-elif [[ " $* " == *" --video "* ]]; then
+fi
+if [[ ${run[1]} == */gallery.py || " $* " == *" --video "* ]]; then
   lists+=(videos)
   run=(xvfb-run -a -s "-screen 0 640x480x24" "${run[@]}")
 fi

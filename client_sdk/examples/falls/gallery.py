@@ -3,7 +3,8 @@
 """Makes the sounds and pictures of the documentation again: gallery.py --build BUILD
 
 Leaves ten sounds as FLAC files with their spectrograms in docs/sounds, the pictures of modes, a pulse, decays,
-a scene and a clip in docs/pictures. ./deploy/examples.sh gallery installs what it needs.
+a scene and a clip in docs/pictures, and the film docs/pictures/carillon.mp4 with its still.
+./deploy/examples.sh gallery installs what it needs. The film needs an X server, such as Xvfb.
 """
 
 import argparse
@@ -239,7 +240,8 @@ def save(figure, path):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
-    parser.add_argument("--only", nargs="*", default=("pulse", "sounds", "modes", "decays", "scene", "clip"))
+    parser.add_argument("--only", nargs="*", default=("pulse", "sounds", "modes", "decays", "scene", "clip",
+                                                      "film"))
     options = parser.parse_args()
     options.build = options.build.resolve()
     sys.path[:0] = [str(options.build / "client_sdk/python"), str(ROOT / "client_sdk/python"),
@@ -262,6 +264,9 @@ def main():
                 for part in options.only:
                     if part == "pulse":
                         pulse()
+                    elif part == "film":
+                        import film
+                        film.make(gallery, PICTURES)
                     else:
                         getattr(gallery, part)()
         finally:
