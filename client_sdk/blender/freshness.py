@@ -17,7 +17,7 @@ PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_ang
 
 
 def digest(scene):
-    """A text that is another one if an animation, a shape, a material or a setting is another one."""
+    """A digest that changes whenever an animation, a shape, a material or a setting changes."""
     seen = hashlib.sha256()
 
     def add(*what):

@@ -66,7 +66,7 @@ def _read_keyed(scene, objects):
 
 
 def _key_density(objects):
-    """How many keys a frame has at most; keys that are farther apart tell nothing between frames."""
+    """The number of keys in a frame, by the median distance of the keys, and at least one."""
     distances = [after.co[0] - before.co[0] for obj in objects if obj.animation_data and obj.animation_data.action
                  for curve in obj.animation_data.action.fcurves
                  for before, after in zip(curve.keyframe_points, curve.keyframe_points[1:])]

@@ -17,25 +17,25 @@ double Compliance(double young_pa, double poisson_ratio) {
 }  // namespace
 
 double ReducedMassKg(const ElasticBody& struck, const ElasticBody& striker,
-                     const HertzContact& told) {
-  const double striker_mass = told.striker_mass_kg.value_or(striker.mass_kg);
-  return told.reduced_mass_kg.value_or(1 / (1 / struck.mass_kg + 1 / striker_mass));
+                     const HertzContact& stated) {
+  const double striker_mass = stated.striker_mass_kg.value_or(striker.mass_kg);
+  return stated.reduced_mass_kg.value_or(1 / (1 / struck.mass_kg + 1 / striker_mass));
 }
 
 double HertzDurationS(const ElasticBody& struck, const ElasticBody& striker,
-                      const HertzContact& told, double impulse_newton_seconds) {
-  const double mass = ReducedMassKg(struck, striker, told);
+                      const HertzContact& stated, double impulse_newton_seconds) {
+  const double mass = ReducedMassKg(struck, striker, stated);
   const double striker_curvature =
-      told.striker_radius_m ? 1 / *told.striker_radius_m : striker.curvature_per_m;
+      stated.striker_radius_m ? 1 / *stated.striker_radius_m : striker.curvature_per_m;
   const double curvature =
-      told.reduced_radius_m
-          ? 1 / *told.reduced_radius_m
+      stated.reduced_radius_m
+          ? 1 / *stated.reduced_radius_m
           : std::max(struck.curvature_per_m + striker_curvature, 1 / kFlattestRadiusM);
   const double modulus =
       1 / (Compliance(struck.young_pa, struck.poisson_ratio) +
-           Compliance(told.striker_young_pa.value_or(striker.young_pa),
-                      told.striker_poisson_ratio.value_or(striker.poisson_ratio)));
-  const double speed = told.approach_speed_m_per_s.value_or(impulse_newton_seconds / (2 * mass));
+           Compliance(stated.striker_young_pa.value_or(striker.young_pa),
+                      stated.striker_poisson_ratio.value_or(striker.poisson_ratio)));
+  const double speed = stated.approach_speed_m_per_s.value_or(impulse_newton_seconds / (2 * mass));
   const double duration_s =
       2.87 * std::pow(mass * mass * curvature / (modulus * modulus * speed), 0.2);
   return std::min(duration_s, kLongestContactS);

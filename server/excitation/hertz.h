@@ -34,18 +34,18 @@ inline constexpr ElasticBody kSteelTip{
 /// edge or at a bump.
 inline constexpr double kFlattestRadiusM = 0.05;
 
-/// Returns the reduced mass of the bodies, kg, or the one that is told.
+/// Returns the reduced mass of the bodies, kg, or the one that is stated.
 double ReducedMassKg(const ElasticBody& struck, const ElasticBody& striker,
-                     const HertzContact& told);
+                     const HertzContact& stated);
 
 /// Returns the time for which the bodies touch, seconds (Johnson, Contact Mechanics, 11.4):
 ///
 ///   T = 2.87 (m^2 / (R E^2 v))^(1/5),  1/E = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
 ///
-/// The values of `told` replace those that follow from the bodies. If the approach speed is absent,
-/// it is v = J/(2 m), the speed at which two elastic bodies exchange the impulse J =
+/// The values of `stated` replace those that follow from the bodies. If the approach speed is
+/// absent, it is v = J/(2 m), the speed at which two elastic bodies exchange the impulse J =
 /// `impulse_newton_seconds`. The result is at most kLongestContactS.
 double HertzDurationS(const ElasticBody& struck, const ElasticBody& striker,
-                      const HertzContact& told, double impulse_newton_seconds);
+                      const HertzContact& stated, double impulse_newton_seconds);
 
 }  // namespace carillon

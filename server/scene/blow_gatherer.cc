@@ -88,9 +88,9 @@ void BlowGatherer::EndBeforeGap(double missing_count) {
   }
 }
 
-void BlowGatherer::Add(const FeltContact& force, const Roughness& roughness) {
-  for (const Felt& felt : force.all()) {
-    Add(Part{.handle = felt.handle, .serial = felt.serial, .impulse = felt.impulse()}, 1,
+void BlowGatherer::Add(const BodyImpulses& force, const Roughness& roughness) {
+  for (const BodyImpulse& on_body : force.all()) {
+    Add(Part{.handle = on_body.handle, .serial = on_body.serial, .impulse = on_body.impulse()}, 1,
         roughness);
   }
 }
@@ -112,17 +112,17 @@ bool BlowGatherer::HasRoom(const ObjectTouch& touch) const {
          std::ranges::binary_search(pairs_, bodies, {}, &Pair::bodies);
 }
 
-void BlowGatherer::Touch(const ObjectTouch& touch, const FeltContact& impulse) {
+void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) {
   const Bodies bodies(touch.contact.handle, touch.partner);
   if (!std::ranges::binary_search(pairs_, bodies, {}, &Pair::bodies)) new_pairs_.insert(bodies);
   PairTouch& added = touches_.emplace_back();
   added.bodies = bodies;
-  for (const Felt& felt : impulse.all()) {
-    added.parts[added.part_count++] = {.handle = felt.handle,
-                                       .mass_kg = felt.mass_kg,
-                                       .serial = felt.serial,
-                                       .impulse = felt.impulse(),
-                                       .collision = felt.collision};
+  for (const BodyImpulse& on_body : impulse.all()) {
+    added.parts[added.part_count++] = {.handle = on_body.handle,
+                                       .mass_kg = on_body.mass_kg,
+                                       .serial = on_body.serial,
+                                       .impulse = on_body.impulse(),
+                                       .collision = on_body.collision};
   }
   added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
   added.roughness = touch.roughness;

@@ -12,7 +12,7 @@
 
 #include "server/excitation/contact.h"
 #include "server/excitation/load_tracker.h"
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
@@ -92,7 +92,7 @@ class BlowGatherer {
   Events Begin(double time_s);
 
   /// Adds a force to this step. The impulses in `force` are newtons, not newton seconds.
-  void Add(const FeltContact& force, const Roughness& roughness);
+  void Add(const BodyImpulses& force, const Roughness& roughness);
 
   /// The greatest number of contacts of a step, and of pairs of bodies whose contacts are followed.
   /// A pair and its contact take about 700 bytes.
@@ -101,9 +101,9 @@ class BlowGatherer {
   /// Returns whether Touch may be called with this contact.
   bool HasRoom(const ObjectTouch& touch) const;
 
-  /// Adds a contact that may be a blow or a load to this step. `impulse` has the impulses that the
-  /// objects of `touch` feel; they must not be zero.
-  void Touch(const ObjectTouch& touch, const FeltContact& impulse);
+  /// Adds a contact that may be a blow or a load to this step. `impulse` has the impulses of the
+  /// contact on its objects; they must not be zero.
+  void Touch(const ObjectTouch& touch, const BodyImpulses& impulse);
 
   /// Ends the step and returns its events.
   Events End();

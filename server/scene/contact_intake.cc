@@ -13,7 +13,7 @@
 #include "proto/cpp/limits.h"
 #include "proto/cpp/shortest_decimal.h"
 #include "proto/cpp/status_macros.h"
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/scene_frame.h"
 #include "server/scene/yielding_blow.h"
 #include "server/synthesis/bank/acceleration_noise.h"
@@ -100,16 +100,16 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
   if (StepImpulses::Struck* struck = may_add ? struck_.Find(impulse) : nullptr) {
     return TryAdd(impulse, *struck);
   }
-  FeltContact felt;
-  RETURN_IF_ERROR(Locate(impulse.contact, PointSource::kClient, 1, felt));
+  BodyImpulses impulses;
+  RETURN_IF_ERROR(Locate(impulse.contact, PointSource::kClient, 1, impulses));
   diagnostics_.NoteZero(impulse.contact);
-  for (size_t i = 0; i < felt.count; ++i) {
+  for (size_t i = 0; i < impulses.count; ++i) {
     BlowRecord blow;
-    blow.handle = felt.by[i].handle;
-    blow.by_sounds = felt.count == felt.by.size();
-    if (blow.by_sounds) blow.by = felt.by[1 - i].handle;
-    AddBlow(felt.by[i].serial, felt.by[i].event, blow, frame);
-    struck_.Append(impulse, felt.by[i], frame);
+    blow.handle = impulses.by[i].handle;
+    blow.by_sounds = impulses.count == impulses.by.size();
+    if (blow.by_sounds) blow.by = impulses.by[1 - i].handle;
+    AddBlow(impulses.by[i].serial, impulses.by[i].event, blow, frame);
+    struck_.Append(impulse, impulses.by[i], frame);
   }
   return absl::OkStatus();
 }
@@ -117,17 +117,17 @@ absl::Status ContactIntake::TryStrike(const ObjectImpulse& impulse) {
 absl::Status ContactIntake::TryAdd(const ObjectImpulse& impulse, StepImpulses::Struck& struck) {
   const Vector3& added = impulse.contact.impulse.impulse_newton_seconds;
   RETURN_IF_ERROR(Validate(impulse.contact.impulse));
-  RETURN_IF_ERROR(diagnostics_.Examine(std::span(&struck.felt, 1), added, 1));
+  RETURN_IF_ERROR(diagnostics_.Examine(std::span(&struck.on_body, 1), added, 1));
   diagnostics_.NoteZero(impulse.contact);
   struck.Add(added);
   if (blows_ == nullptr) return absl::OkStatus();
-  MixerEvent alone = struck.felt.event;
+  MixerEvent alone = struck.on_body.event;
   std::ranges::transform(added,
                          std::get<SurfaceImpulse>(alone.action).impulse_newton_seconds.begin(),
                          [](double x) { return static_cast<float>(x); });
   BlowRecord blow;
-  blow.handle = struck.felt.handle;
-  AddBlow(struck.felt.serial, alone, blow, struck.frame);
+  blow.handle = struck.on_body.handle;
+  AddBlow(struck.on_body.serial, alone, blow, struck.frame);
   return absl::OkStatus();
 }
 
@@ -143,9 +143,9 @@ void ContactIntake::Hold(std::span<const ObjectForce> forces) {
 absl::Status ContactIntake::TryHold(const ObjectForce& force) {
   RETURN_IF_ERROR(Validate(force.roughness));
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
-  FeltContact felt;
-  RETURN_IF_ERROR(Locate(force.contact, PointSource::kClient, settings_.step_s, felt));
-  gatherer_.Add(felt, force.roughness);
+  BodyImpulses impulses;
+  RETURN_IF_ERROR(Locate(force.contact, PointSource::kClient, settings_.step_s, impulses));
+  gatherer_.Add(impulses, force.roughness);
   return absl::OkStatus();
 }
 
@@ -171,16 +171,16 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
                                 " engine contacts, or more pairs of bodies have touched: report "
                                 "fewer points, and give a body the same partner in each step"));
   }
-  FeltContact felt;
-  RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, felt));
-  for (const Felt& one : felt.all()) {
+  BodyImpulses impulses;
+  RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, impulses));
+  for (const BodyImpulse& one : impulses.all()) {
     balance_.Touch({.handle = one.handle,
                     .mass_kg = one.mass_kg,
                     .impulse_newton_seconds = one.impulse().impulse_newton_seconds,
                     .vertices = one.impulse().at.vertices,
                     .weights = one.impulse().at.weights});
   }
-  gatherer_.Touch(touch, felt);
+  gatherer_.Touch(touch, impulses);
   return absl::OkStatus();
 }
 
@@ -239,22 +239,23 @@ void ContactIntake::Note(uint64_t count, const ReportPlace& place, const absl::S
 }
 
 absl::Status ContactIntake::Locate(const ObjectContact& contact, PointSource source, double seconds,
-                                   FeltContact& felt) {
+                                   BodyImpulses& impulses) {
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Find(contact.handle));
   const SoundingObject* second = nullptr;
   if (contact.second) {
     ASSIGN_OR_RETURN(second, scene_.Find(contact.second->handle));
   }
-  RETURN_IF_ERROR(settings_.reading.scene_frame ? Feel(FromSceneFrame(contact, *object, second),
-                                                       source, *object, second, felt)
-                                                : Feel(contact, source, *object, second, felt));
+  RETURN_IF_ERROR(settings_.reading.scene_frame
+                      ? FindBodyImpulses(FromSceneFrame(contact, *object, second), source, *object,
+                                         second, impulses)
+                      : FindBodyImpulses(contact, source, *object, second, impulses));
   if (settings_.reading.gaussian_pulses) {
-    for (Felt& one : felt.all()) {
+    for (BodyImpulse& one : impulses.all()) {
       auto& impulse = std::get<SurfaceImpulse>(one.event.action);
       impulse.pulse = Pulse::Gaussian(impulse.pulse.duration_s());
     }
   }
-  return diagnostics_.Examine(felt.all(), contact.impulse.impulse_newton_seconds, seconds);
+  return diagnostics_.Examine(impulses.all(), contact.impulse.impulse_newton_seconds, seconds);
 }
 
 double ContactIntake::AheadS(double frame) const {
@@ -276,16 +277,16 @@ void ContactIntake::PushStruck() {
 void ContactIntake::PushStruck(std::span<StepImpulses::Struck> events) {
   const MutexLock lock(&scene_.mutex());
   for (StepImpulses::Struck& struck : events) {
-    MixerEvent& event = struck.felt.event;
+    MixerEvent& event = struck.on_body.event;
     const absl::StatusOr<const SoundingObject*> object =
-        scene_.FindSame(struck.felt.handle, struck.felt.serial);
+        scene_.FindSame(struck.on_body.handle, struck.on_body.serial);
     if (!object.ok()) {
       Reject(event.ReportCount(), object.status());
       continue;
     }
     impulse_count_ += event.ReportCount();
     event.bank = (*object)->bank;
-    LetYield(**object, struck.felt.collision, std::get<SurfaceImpulse>(event.action));
+    LetYield(**object, struck.on_body.collision, std::get<SurfaceImpulse>(event.action));
     Push(event, struck.frame);
   }
 }

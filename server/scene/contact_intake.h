@@ -13,13 +13,13 @@
 #include "server/scene/blow_gatherer.h"
 #include "server/scene/blow_record.h"
 #include "server/scene/diagnostics.h"
-#include "server/scene/due_frame.h"
 #include "server/scene/momentum_balance.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
 #include "server/scene/scene.h"
 #include "server/scene/scene_space.h"
 #include "server/scene/step_impulses.h"
+#include "server/scene/time_mapping.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
 namespace carillon {
@@ -152,10 +152,10 @@ class ContactIntake {
   void Note(const ObjectContact& contact, const absl::Status& verdict) {
     Note(contact.object_count(), contact.place, verdict);
   }
-  /// Finds the objects of a contact and the impulses that they feel. `seconds` is one for an
+  /// Finds the objects of a contact and the impulses on them. `seconds` is one for an
   /// impulse, and the step for a force.
   absl::Status Locate(const ObjectContact& contact, PointSource source, double seconds,
-                      FeltContact& felt) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
+                      BodyImpulses& impulses) ABSL_EXCLUSIVE_LOCKS_REQUIRED(scene_.mutex());
   /// Hands on the impulses of the step so far. Those on an object that was removed meanwhile are
   /// rejected.
   void PushStruck();

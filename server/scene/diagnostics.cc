@@ -41,12 +41,12 @@ bool Diagnostics::NoteZero(const ObjectContact& contact) {
   return zero;
 }
 
-absl::Status Diagnostics::Examine(std::span<const Felt> felt, const Vector3& vector,
+absl::Status Diagnostics::Examine(std::span<const BodyImpulse> impulses, const Vector3& vector,
                                   double seconds) {
   const auto& [x, y, z] = vector;
   // No less than the length, and far quicker.
   const double bound = (std::abs(x) + std::abs(y) + std::abs(z)) * seconds;
-  for (const Felt& one : felt) {
+  for (const BodyImpulse& one : impulses) {
     findings_.largest_distance_m = std::max(findings_.largest_distance_m, one.distance_m);
     if (one.distance_m > kDistantShare * one.extent_m) ++findings_.distant_point_count;
     const double noted_speed = std::min(kFastSpeed, findings_.largest_speed_change_m_per_s);

@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 #include "server/scene/blow_gatherer.h"
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/momentum_balance.h"
 #include "server/scene/object_contact.h"
 #include "server/scene/rejection_counts.h"
@@ -51,7 +51,8 @@ class Diagnostics {
 
   /// Counts unusual properties of a contact. `vector` is its impulse, or a force that lasts for
   /// `seconds`. Errors: InvalidArgument (IMPULSE_TOO_LARGE).
-  absl::Status Examine(std::span<const Felt> felt, const Vector3& vector, double seconds);
+  absl::Status Examine(std::span<const BodyImpulse> impulses, const Vector3& vector,
+                       double seconds);
 
   /// Counts `count` contacts that could not be used.
   void Reject(uint64_t count, absl::Status reason);

@@ -61,10 +61,10 @@ Motion MotionTo(const Pose& pose, double glide_frames) {
 }
 
 double PoseTimes::GlideS(std::optional<uint32_t> handle, double time_s) {
-  const auto [told, first] = told_s_.try_emplace(handle, time_s);
+  const auto [reported, first] = reported_s_.try_emplace(handle, time_s);
   if (first) return 0;
-  const double since_s = time_s - told->second;
-  told->second = time_s;
+  const double since_s = time_s - reported->second;
+  reported->second = time_s;
   return std::min(since_s, step_s_);
 }
 

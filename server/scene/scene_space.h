@@ -47,7 +47,7 @@ class PoseTimes {
 
  private:
   double step_s_;
-  std::map<std::optional<uint32_t>, double> told_s_;
+  std::map<std::optional<uint32_t>, double> reported_s_;
 };
 
 }  // namespace carillon

@@ -29,12 +29,12 @@ size_t HashOf(const StepImpulses::Key& key) {
 }  // namespace
 
 void StepImpulses::Struck::Add(const Vector3& impulse_newton_seconds) {
-  auto& vector = std::get<SurfaceImpulse>(felt.event.action).impulse_newton_seconds;
+  auto& vector = std::get<SurfaceImpulse>(on_body.event.action).impulse_newton_seconds;
   for (size_t axis = 0; axis < vector.size(); ++axis) {
     sum_newton_seconds[axis] += impulse_newton_seconds[axis];
     vector[axis] = static_cast<float>(sum_newton_seconds[axis]);
   }
-  ++felt.event.added_count;
+  ++on_body.event.added_count;
 }
 
 StepImpulses::Struck* StepImpulses::Find(const ObjectImpulse& impulse) {
@@ -44,8 +44,8 @@ StepImpulses::Struck* StepImpulses::Find(const ObjectImpulse& impulse) {
   return index != kNone && struck_[index].key == *key ? &struck_[index] : nullptr;
 }
 
-void StepImpulses::Append(const ObjectImpulse& impulse, const Felt& felt, double frame) {
-  Struck& struck = struck_.emplace_back(Struck{.felt = felt, .frame = frame});
+void StepImpulses::Append(const ObjectImpulse& impulse, const BodyImpulse& on_body, double frame) {
+  Struck& struck = struck_.emplace_back(Struck{.on_body = on_body, .frame = frame});
   const std::optional<Key> key = KeyOf(impulse);
   if (!key) return;
   struck.key = *key;

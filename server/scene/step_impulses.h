@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/object_contact.h"
 
 namespace carillon {
@@ -29,7 +29,7 @@ class StepImpulses {
 
   /// An event of the step, with the number of its frame.
   struct Struck {
-    Felt felt{};
+    BodyImpulse on_body{};
     double frame = 0;
     Key key{};
     Vector3 sum_newton_seconds{};  ///< in double precision, so that many small impulses count
@@ -45,7 +45,7 @@ class StepImpulses {
   Struck* Find(const ObjectImpulse& impulse);
 
   /// Appends the event of `impulse` on one of its objects.
-  void Append(const ObjectImpulse& impulse, const Felt& felt, double frame);
+  void Append(const ObjectImpulse& impulse, const BodyImpulse& on_body, double frame);
 
   /// Returns whether the events of this many impulses may be appended before Clear is called.
   bool HasRoom(size_t impulse_count) const {

@@ -13,6 +13,7 @@ from daemon import ROOT, DaemonTest
 
 sys.path.insert(0, str(ROOT / "client_sdk/examples/falls"))
 import falls  # noqa: E402
+import video  # noqa: E402
 
 LIMIT_DB = 3
 
@@ -43,6 +44,14 @@ class FallsTest(DaemonTest):
         print({engine: round(level - median, 1) for engine, level in levels.items()}, flush=True)
         for engine, level in levels.items():
             self.assertLess(abs(level - median), LIMIT_DB, engine)
+
+    def test_a_video_shows_the_bodies_where_the_simulation_has_them(self):
+        trace = self.folder / "seen.contacts"
+        falls.record("bullet", self.scene, trace, rate=1000, seconds=0.3)
+        frames = video.frames_of(self.scene, carillon.Trace.read(trace).steps)
+        self.assertAlmostEqual(len(frames), 0.3 * video.FRAMES_PER_S, delta=1)
+        ways = [numpy.linalg.norm(numpy.subtract(last[0], first[0])) for first, last in zip(frames[0], frames[-1])]
+        self.assertGreater(max(ways), 0.01)
 
     def render(self, path):
         """Softly, so that nothing is limited."""

@@ -83,6 +83,7 @@ class BodyStage:
         self.actor.SetMapper(mapper)
         self.mapper, self.vtk = mapper, vtk
         self.actor.GetProperty().SetSpecular(0.3)
+        self.actor.GetProperty().SetAmbient(0.3)
         self.renderer.AddActor(self.actor)
 
     def frame(self, degrees, edges=False, moved=None):
@@ -116,6 +117,7 @@ def lettered(pixels, title, below, strip=None, fraction=0.0):
     pixels = pixels.copy()
     if strip is not None:
         heard = int(fraction * WIDTH)
+        pixels[:-STRIP] = pixels[STRIP // 2:-STRIP // 2].copy()
         pixels[-STRIP:] = 8
         pixels[-STRIP:, :heard] = strip[:, :heard]
     image = Image.fromarray(pixels)
@@ -199,7 +201,7 @@ def make(gallery, folder):
              "-ac", "2", "-i", str(wave), "-c:v", "libx264", "-preset", "slow", "-pix_fmt", "yuv420p", "-crf", "28",
              "-c:a", "aac", "-b:a", "96k", "-movflags", "+faststart", str(folder / "carillon.mp4")]
     subprocess.run(words, input=b"".join(frames), check=True)
-    still = frames[len(parts[0][0]) + int(0.4 * video.FRAMES_PER_S * MODE_S)]
+    still = frames[len(parts[0][0]) + 5]  # where the first mode bends the body most
     scene = parts[-2][0][int(0.9 * video.FRAMES_PER_S)]
     both = Image.new("RGB", (2 * WIDTH, HEIGHT))
     both.paste(Image.frombytes("RGB", (WIDTH, HEIGHT), still), (0, 0))

@@ -45,9 +45,6 @@ def frames_of(scene, steps):
 
 def take(step, now):
     """Moves the bodies to their poses in the step; object i + 1 is body i."""
-    for row in step.poses:
-        place, turn = row.pose.position_m, row.pose.orientation
-        now[row.object - 1] = ((place.x, place.y, place.z), (turn.w, turn.x, turn.y, turn.z))
     columns = step.poses
     for i, handle in enumerate(columns.object):
         now[handle - 1] = (columns.position_m[3 * i:3 * i + 3], columns.orientation[4 * i:4 * i + 4] or (1, 0, 0, 0))

@@ -24,7 +24,7 @@ class GltfFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Returns InvalidArgument with `reason` and what the fault, of either kind, says.
+/// Returns InvalidArgument with `reason` and the text of the fault, whether ours or the library's.
 absl::Status GltfRefusal(absl::string_view reason, const std::exception& fault);
 
 /// A glTF 2.0 asset, text or binary, with its buffers. A buffer is read when it is first asked for,

@@ -8,7 +8,7 @@
 namespace carillon {
 
 /// An event and its place among the blocks that are rendered together. The frame of a contact is
-/// decided in server/scene/due_frame.h.
+/// decided in server/scene/time_mapping.h.
 struct DueEvent {
   uint32_t slot = 0;    ///< the bank's
   uint32_t block = 0;   ///< index among the blocks rendered together

@@ -20,8 +20,8 @@ namespace {
 constexpr double kStepS = 0.01;
 constexpr SurfaceImpulse kTen{.at = {.weights = {1, 0, 0}}, .impulse_newton_seconds = {0, 0, 10}};
 
-FeltContact FeltBy(uint32_t handle, const SurfaceImpulse& impulse) {
-  return {.by = {Felt{.handle = handle, .event = {.action = impulse}}}, .count = 1};
+BodyImpulses ImpulseOn(uint32_t handle, const SurfaceImpulse& impulse) {
+  return {.by = {BodyImpulse{.handle = handle, .event = {.action = impulse}}}, .count = 1};
 }
 
 struct Pushed : ForceEvent {
@@ -51,7 +51,7 @@ class BlowGathererTest : public testing::Test {
   }
 
   std::vector<Pushed> Hold(double time_s, const Roughness& roughness = {}) {
-    return Step(time_s, [&] { gatherer_.Add(FeltBy(3, kTen), roughness); });
+    return Step(time_s, [&] { gatherer_.Add(ImpulseOn(3, kTen), roughness); });
   }
 
   std::vector<Pushed> Nothing(double time_s) {
@@ -72,7 +72,7 @@ TEST_F(BlowGathererTest, GivesEachObjectItsForcesAndThenAKnot) {
 }
 
 TEST_F(BlowGathererTest, WhatIsABlowToOneObjectOfAPairIsABlowToBoth) {
-  FeltContact impulse = FeltBy(3, kTen);
+  BodyImpulses impulse = ImpulseOn(3, kTen);
   SurfaceImpulse opposite = kTen;
   opposite.impulse_newton_seconds[2] = -10;
   impulse.by[1] = {.handle = 4, .event = {.action = opposite}};
@@ -110,7 +110,7 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
     return [this, newton_seconds] {
       SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = newton_seconds;
-      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
+      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, ImpulseOn(3, impulse));
     };
   };
   std::vector<float> blows;
@@ -147,7 +147,7 @@ double StruckBy(int step_count, const Touch& touch) {
 void TouchBy(BlowGatherer& gatherer, uint32_t handle, uint32_t partner, double newton_seconds) {
   SurfaceImpulse impulse = kTen;
   impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
-  gatherer.Touch({.contact = {.handle = handle}, .partner = partner}, FeltBy(handle, impulse));
+  gatherer.Touch({.contact = {.handle = handle}, .partner = partner}, ImpulseOn(handle, impulse));
 }
 
 TEST(BlowGatherer, WhatRestsWhenTheSimulationBeginsDoesNotStrike) {
@@ -221,7 +221,7 @@ TEST_F(BlowGathererTest, WhatRestsIsALoadThoughEverySecondStepIsMissing) {
   for (int i = 0; i < 30; ++i) {
     if (i == 8) before = gatherer_.counts().blow_count;
     Step(2 * i * kStepS,
-         [&] { gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, kTen)); });
+         [&] { gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, ImpulseOn(3, kTen)); });
   }
   EXPECT_EQ(gatherer_.counts().blow_count, before);
 }
@@ -235,7 +235,7 @@ TEST_F(BlowGathererTest, HasRoomForTheGreatestNumberOfContactsAndOfPairs) {
     gatherer_.Begin(0);
     for (uint32_t i = 0; i < BlowGatherer::kMostTouches; ++i) {
       ASSERT_TRUE(gatherer_.HasRoom(touch(i)));
-      gatherer_.Touch(touch(i), FeltBy(3, kTen));
+      gatherer_.Touch(touch(i), ImpulseOn(3, kTen));
     }
     EXPECT_FALSE(gatherer_.HasRoom(touch(0)));
     gatherer_.End();
@@ -266,9 +266,9 @@ TEST(StepIntervalsTest, TellsARegularGapAndNoOther) {
 
 TEST_F(BlowGathererTest, ARoughnessIsWeighedByItsForce) {
   const auto pushed = Step(0, [&] {
-    gatherer_.Add(FeltBy(3, kTen),
+    gatherer_.Add(ImpulseOn(3, kTen),
                   {.travel_speed_m_per_s = 2, .depth = 0.4, .irregularity_length_m = 0.001});
-    gatherer_.Add(FeltBy(3, kTen), {});  // rests
+    gatherer_.Add(ImpulseOn(3, kTen), {});  // rests
   });
   const auto& knot = std::get<ForceKnot>(pushed.back().action);
   EXPECT_FLOAT_EQ(knot.roughness, 0.2F);
@@ -280,7 +280,7 @@ TEST_F(BlowGathererTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
     return [this, newton_seconds] {
       SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = static_cast<float>(newton_seconds);
-      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, FeltBy(3, impulse));
+      gatherer_.Touch({.contact = {.handle = 3}, .partner = 9}, ImpulseOn(3, impulse));
     };
   };
   auto pushed = Step(0, touch(1));  // from flight
@@ -302,7 +302,7 @@ TEST_F(BlowGathererTest, OfATouchThePartThatIsABlowStrikesAndTheRestIsAForce) {
 
 TEST_F(BlowGathererTest, AnotherPartnerIsAnotherPair) {
   const auto touch = [this](uint32_t partner) {
-    gatherer_.Touch({.contact = {.handle = 3}, .partner = partner}, FeltBy(3, kTen));
+    gatherer_.Touch({.contact = {.handle = 3}, .partner = partner}, ImpulseOn(3, kTen));
   };
   for (int i = 0; i < 20; ++i) Step(i * kStepS, [&] { touch(1); });
   const auto pushed = Step(20 * kStepS, [&] {
@@ -315,7 +315,7 @@ TEST_F(BlowGathererTest, AnotherPartnerIsAnotherPair) {
 
 TEST_F(BlowGathererTest, ABlowThatIsNotOverIsSentAtTheEnd) {
   Nothing(0);
-  Step(kStepS, [&] { gatherer_.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen)); });
+  Step(kStepS, [&] { gatherer_.Touch({.contact = {.handle = 3}}, ImpulseOn(3, kTen)); });
   const auto last = gatherer_.Finish();
   ASSERT_EQ(last.size(), 1U);
   EXPECT_EQ(std::get<SurfaceImpulse>(last[0].action).impulse_newton_seconds[2], 10);
@@ -331,7 +331,7 @@ std::vector<double> HopTimes(int hop_count, double time_offset_s, uint32_t partn
     gatherer.Begin(step * kStepS);
     if (step % 4 == 2) {
       gatherer.Touch({.contact = {.handle = 3}, .partner = partner, .time_offset_s = time_offset_s},
-                     FeltBy(3, kTen));
+                     ImpulseOn(3, kTen));
     }
     for (const ForceEvent& event : gatherer.End()) {
       if (Pushed{event}.Impulse()) times.push_back(event.time_s / kStepS);
@@ -376,7 +376,7 @@ TEST(BlowGatherer, BlowsAfterAFlightOfATenthOfASecondHaveExactTimes) {
   BlowGatherer gatherer(kStepS);
   for (int step = 0; step < 240; ++step) {
     gatherer.Begin(step * kStepS);
-    if (step % 12 == 0) gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, kTen));
+    if (step % 12 == 0) gatherer.Touch({.contact = {.handle = 3}}, ImpulseOn(3, kTen));
     for (const ForceEvent& event : gatherer.End()) {
       if (step > 0 && Pushed{event}.Impulse()) {
         EXPECT_EQ(event.time_s, step * kStepS);
@@ -402,12 +402,12 @@ std::vector<Pushed> Fall(double rate_hz, double length_s, double phase) {
     impulse.impulse_newton_seconds[2] = static_cast<float>(until(end_s) - until(begin_s) + rests);
     for (const ForceEvent& event : gatherer.Begin(step / rate_hz)) pushed.push_back({event});
     if (end_s > 0) {
-      FeltContact felt = FeltBy(3, impulse);
-      felt.duration_follows_impulse = true;
-      std::get<SurfaceImpulse>(felt.by[0].event.action).pulse =
+      BodyImpulses impulses = ImpulseOn(3, impulse);
+      impulses.duration_follows_impulse = true;
+      std::get<SurfaceImpulse>(impulses.by[0].event.action).pulse =
           Pulse::RaisedCosine(static_cast<float>(
               1e-4 * std::pow(double{impulse.impulse_newton_seconds[2]}, kDurationPower)));
-      gatherer.Touch({.contact = {.handle = 3}}, felt);
+      gatherer.Touch({.contact = {.handle = 3}}, impulses);
     }
     for (const ForceEvent& event : gatherer.End()) pushed.push_back({event});
   }
@@ -444,7 +444,7 @@ TEST(BlowGatherer, ABodyThatIsPutDownGentlyDoesNotStrike) {
       const double newtons = std::clamp((step - 10) / rate_hz / 0.02, 0.0, 1.0);
       impulse.impulse_newton_seconds[2] = static_cast<float>(newtons / rate_hz);
       gatherer.Begin(step / rate_hz);
-      if (newtons > 0) gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
+      if (newtons > 0) gatherer.Touch({.contact = {.handle = 3}}, ImpulseOn(3, impulse));
       for (const ForceEvent& event : gatherer.End()) struck += Pushed{event}.Impulse().value_or(0);
     }
     EXPECT_LT(struck, 1e-3) << rate_hz;  // newton seconds; the first step alone would be 0.004
@@ -468,7 +468,7 @@ std::vector<float> BlowsOfSpread(double rate_hz, int step_count, bool half_sine)
     if (step >= 10 && step - 10 < parts.size()) {
       SurfaceImpulse impulse = kTen;
       impulse.impulse_newton_seconds[2] = static_cast<float>(parts[step - 10] / whole);
-      gatherer.Touch({.contact = {.handle = 3}}, FeltBy(3, impulse));
+      gatherer.Touch({.contact = {.handle = 3}}, ImpulseOn(3, impulse));
     }
     for (const ForceEvent& event : gatherer.End()) {
       if (const auto impulse = Pushed{event}.Impulse()) blows.push_back(*impulse);
@@ -499,7 +499,7 @@ TEST(BlowGatherer, ABodyThatIsPutDownAndSlidesIsHeardAfter40Milliseconds) {
     const Roughness roughness{.travel_speed_m_per_s = 1, .depth = 0.3};
     gatherer.Begin(step * 0.004);
     if (step >= 10) {
-      gatherer.Touch({.contact = {.handle = 3}, .roughness = roughness}, FeltBy(3, kTen));
+      gatherer.Touch({.contact = {.handle = 3}, .roughness = roughness}, ImpulseOn(3, kTen));
     }
     for (const ForceEvent& event : gatherer.End()) {
       const auto* knot = std::get_if<ForceKnot>(&event.action);

@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/small_model.h"
 
@@ -120,7 +120,7 @@ TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBoth
   soft.material.young_pa /= 100;
   ASSERT_TRUE(scenes_.AddObject(scene_, 2, SmallModel(), SmallProperties()).ok());
   ASSERT_TRUE(scenes_.AddObject(scene_, 3, SmallModel(), soft).ok());
-  const auto feel = [&](uint32_t first, uint32_t second) {
+  const auto find = [&](uint32_t first, uint32_t second) {
     ObjectContact contact = SmallImpulse(first).contact;
     contact.impulse.duration_s = std::nullopt;
     contact.impulse.hertz = {
@@ -128,11 +128,11 @@ TEST_F(ContactStreamTest, AnElasticCollisionOfTwoObjectsLastsAsLongForBothByBoth
     contact.second = {.handle = second, .location = Point{0, 0, 0}};
     const SoundingObject object = scenes_.UpdateObject(scene_, first, {})->object;
     const SoundingObject other = scenes_.UpdateObject(scene_, second, {})->object;
-    FeltContact felt;
-    EXPECT_TRUE(Feel(contact, PointSource::kClient, object, &other, felt).ok());
-    return felt;
+    BodyImpulses impulses;
+    EXPECT_TRUE(FindBodyImpulses(contact, PointSource::kClient, object, &other, impulses).ok());
+    return impulses;
   };
-  const FeltContact hard = feel(1, 2), mixed = feel(1, 3), reversed = feel(3, 1);
+  const BodyImpulses hard = find(1, 2), mixed = find(1, 3), reversed = find(3, 1);
   EXPECT_EQ(hard.by[0].impulse().pulse.duration_s(), hard.by[1].impulse().pulse.duration_s());
   EXPECT_EQ(mixed.by[0].impulse().pulse.duration_s(), mixed.by[1].impulse().pulse.duration_s());
   EXPECT_FLOAT_EQ(mixed.by[0].impulse().pulse.duration_s(),

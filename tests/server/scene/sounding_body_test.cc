@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/small_model.h"
 
@@ -45,9 +45,10 @@ TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
   ObjectContact contact = SmallImpulse(1).contact;
   // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
   contact.impulse.location = Point{0, 0.15, 0};
-  FeltContact felt;
-  ASSERT_TRUE(Feel(contact, PointSource::kClient, placed.object, nullptr, felt).ok());
-  const TrianglePoint& at = felt.by[0].impulse().at;
+  BodyImpulses impulses;
+  ASSERT_TRUE(
+      FindBodyImpulses(contact, PointSource::kClient, placed.object, nullptr, impulses).ok());
+  const TrianglePoint& at = impulses.by[0].impulse().at;
   for (size_t corner = 0; corner < 3; ++corner) {
     const uint32_t vertex = at.vertices[corner];
     EXPECT_NEAR(at.weights[corner], vertex == 0 || vertex == 2 ? 0.5 : 0, 1e-6);

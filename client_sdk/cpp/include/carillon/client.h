@@ -253,8 +253,8 @@ class Client {
 
   /// Writes a consistent copy of the daemon's database to a file. A file that has the name already
   /// is replaced once the copy is complete; after an error it stays as it was.
-  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION (the same: the file
-  /// belongs to the database of a daemon), DATA_LOSS.
+  /// Further errors: INTERNAL (OUTPUT_NOT_WRITABLE), FAILED_PRECONDITION
+  /// (OUTPUT_NOT_WRITABLE, too, if the file belongs to the database of a daemon), DATA_LOSS.
   virtual absl::Status BackUpDatabase(const std::string& file) const;
 
   /// Deletes the models that sounded least recently until the others fit into the request's budget.

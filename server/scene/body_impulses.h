@@ -17,7 +17,7 @@
 namespace carillon {
 
 /// The impulse of a contact on one object, as the event that the object's bank gets.
-struct Felt {
+struct BodyImpulse {
   uint32_t handle = 0;
   MixerEvent event{};     ///< a SurfaceImpulse; gets its time when it is sent
   double distance_m = 0;  ///< distance from the point of the contact to the surface
@@ -32,16 +32,16 @@ struct Felt {
   const SurfaceImpulse& impulse() const { return std::get<SurfaceImpulse>(event.action); }
 };
 
-/// The impulses that the one or two objects of a contact feel.
-struct FeltContact {
-  std::array<Felt, 2> by{};
+/// The impulses of a contact on its one or two objects.
+struct BodyImpulses {
+  std::array<BodyImpulse, 2> by{};
   size_t count = 0;
   /// Whether the duration was computed from the impulse, so that a greater impulse has a shorter
   /// contact.
   bool duration_follows_impulse = false;
 
-  std::span<Felt> all() { return std::span(by).first(count); }
-  std::span<const Felt> all() const { return std::span(by).first(count); }
+  std::span<BodyImpulse> all() { return std::span(by).first(count); }
+  std::span<const BodyImpulse> all() const { return std::span(by).first(count); }
 };
 
 /// The duration of an elastic collision is proportional to the impulse to this power.
@@ -58,7 +58,8 @@ enum class PointSource {
 /// duration is that of the collision of `object` with `second` or, if that is null, with the tip of
 /// a steel hammer. Errors: InvalidArgument (INVALID_POSE: the rotation between the objects, and
 /// those of Validate and of SurfaceLocator).
-absl::Status Feel(const ObjectContact& contact, PointSource source, const SoundingObject& object,
-                  const SoundingObject* second, FeltContact& felt);
+absl::Status FindBodyImpulses(const ObjectContact& contact, PointSource source,
+                              const SoundingObject& object, const SoundingObject* second,
+                              BodyImpulses& impulses);
 
 }  // namespace carillon

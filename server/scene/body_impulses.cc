@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/felt_contact.h"
+#include "server/scene/body_impulses.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,23 +79,23 @@ double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1]
 
 /// Fills in the impulse on one object, except for its pulse.
 void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vector3& impulse,
-            Felt& felt) {
+            BodyImpulse& on_body) {
   const auto narrow = [](double x) { return static_cast<float>(x); };
   SurfaceImpulse surface{.at = {.vertices = located.vertices}};
   std::ranges::transform(located.weights, surface.at.weights.begin(), narrow);
   std::ranges::transform(impulse, surface.impulse_newton_seconds.begin(), narrow);
-  felt.event = {.bank = object.bank, .action = surface};
+  on_body.event = {.bank = object.bank, .action = surface};
   const SoundingMaterial& material = object.properties.material;
-  felt.distance_m = located.distance_m * material.size;
-  felt.extent_m = object.body->extent_m * material.size;
-  felt.mass_kg = MassKg(object);
-  felt.serial = object.serial;
-  felt.largest_newton_seconds =
-      10 * felt.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
+  on_body.distance_m = located.distance_m * material.size;
+  on_body.extent_m = object.body->extent_m * material.size;
+  on_body.mass_kg = MassKg(object);
+  on_body.serial = object.serial;
+  on_body.largest_newton_seconds =
+      10 * on_body.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
 }
 
-void SetDuration(double duration_s, FeltContact& felt) {
-  for (Felt& one : felt.all()) {
+void SetDuration(double duration_s, BodyImpulses& impulses) {
+  for (BodyImpulse& one : impulses.all()) {
     std::get<SurfaceImpulse>(one.event.action).pulse =
         Pulse::RaisedCosine(static_cast<float>(duration_s));
   }
@@ -112,8 +112,9 @@ Vector3 OppositeImpulse(const ObjectContact& contact, const SoundingObject& obje
 
 }  // namespace
 
-absl::Status Feel(const ObjectContact& contact, PointSource source, const SoundingObject& object,
-                  const SoundingObject* second, FeltContact& felt) {
+absl::Status FindBodyImpulses(const ObjectContact& contact, PointSource source,
+                              const SoundingObject& object, const SoundingObject* second,
+                              BodyImpulses& impulses) {
   const ContactImpulse& impulse = contact.impulse;
   if (second != nullptr && contact.second->rotation) {
     RETURN_IF_ERROR(Validate(*contact.second->rotation));
@@ -125,32 +126,32 @@ absl::Status Feel(const ObjectContact& contact, PointSource source, const Soundi
   };
   ASSIGN_OR_RETURN(const LocatedPoint& located,
                    locate(object, impulse.location, impulse.impulse_newton_seconds));
-  felt.by[0].handle = contact.handle;
-  felt.count = 1;
-  FillIn(object, located, impulse.impulse_newton_seconds, felt.by[0]);
+  impulses.by[0].handle = contact.handle;
+  impulses.count = 1;
+  FillIn(object, located, impulse.impulse_newton_seconds, impulses.by[0]);
   ElasticBody striker = kSteelTip;
   if (second != nullptr) {
     const Vector3 opposite = OppositeImpulse(contact, object, *second);
     ASSIGN_OR_RETURN(const LocatedPoint& on_second,
                      locate(*second, contact.second->location, opposite));
-    felt.by[1].handle = contact.second->handle;
-    felt.count = 2;
-    FillIn(*second, on_second, opposite, felt.by[1]);
+    impulses.by[1].handle = contact.second->handle;
+    impulses.count = 2;
+    FillIn(*second, on_second, opposite, impulses.by[1]);
     striker = ElasticBodyAt(*second, on_second);
   }
   if (impulse.duration_s) {
-    SetDuration(*impulse.duration_s, felt);
+    SetDuration(*impulse.duration_s, impulses);
     return absl::OkStatus();
   }
   const ElasticBody struck = ElasticBodyAt(object, located);
   const Collision collision{
       .reduced_mass_kg = ReducedMassKg(struck, striker, impulse.hertz),
       .stated_speed_m_per_s = impulse.hertz.approach_speed_m_per_s.value_or(0)};
-  for (Felt& one : felt.all()) one.collision = collision;
-  felt.duration_follows_impulse = !impulse.hertz.approach_speed_m_per_s;
+  for (BodyImpulse& one : impulses.all()) one.collision = collision;
+  impulses.duration_follows_impulse = !impulse.hertz.approach_speed_m_per_s;
   SetDuration(
       HertzDurationS(struck, striker, impulse.hertz, Magnitude(impulse.impulse_newton_seconds)),
-      felt);
+      impulses);
   return absl::OkStatus();
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/scene/due_frame.h"
+#include "server/scene/time_mapping.h"
 
 #include <cmath>
 #include <utility>
