@@ -35,8 +35,8 @@ class JobJournal {
     return database_.jobs().RemoveClient(digest, client);
   }
 
-  /// Writes the start or the end of a job, or a change of its clients. Without it, the next daemon
-  /// counts one start less, or runs the job again and finds its result.
+  /// Writes the start of a job, or a change of its clients. Without it, the next daemon counts one
+  /// start less.
   void Note(const JobRecord& record, const std::vector<std::string>& clients = {});
 
   /// Copies the coarse model `from` to the name of the job that waits for it, which otherwise goes

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/status_macros.h"
 #include "server/decomposition/job/job_rules.h"
 #include "server/decomposition/job/memory_estimate.h"
 #include "server/decomposition/job/stored_model.h"
@@ -21,6 +23,14 @@ constexpr double kWeightOfNewestRun = 0.1;
 // thousand vertices.
 constexpr uint64_t kTransferBytes = uint64_t{256} << 20U;
 constexpr uint64_t kTransferTimesModel = 4;
+
+constexpr std::chrono::milliseconds kPauseBeforeStoring(250);
+
+// Whether a write fails only as long as the disk is full or another process holds the database.
+bool IsStoredLater(const absl::Status& status) {
+  const std::string reason = ToErrorInfo(status).reason();
+  return reason == "DATABASE_FULL" || reason == "DATABASE_BUSY";
+}
 
 uint64_t GuessBytes(ModeDatabase& database, const JobRecord& record,
                     const v1::CreateModalModelRequest& request) {
@@ -75,9 +85,9 @@ void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request, Job
 
 // The transfer's job is stored before the end of the model's, so that a daemon that is killed in
 // between finds it.
-void JobRuns::FollowByTransfer(const ActiveJob& model) {
+absl::Status JobRuns::FollowByTransfer(const ActiveJob& model) {
   if (!settings_.transfers || !model.record.transfer_of.empty() || model.given.without_transfer()) {
-    return;
+    return absl::OkStatus();
   }
   WantedJob wanted = WantedTransfer(model.record.digest, model.given);
   if (const std::optional<ActiveJob> active = jobs_.Find(wanted.digest)) {
@@ -85,14 +95,14 @@ void JobRuns::FollowByTransfer(const ActiveJob& model) {
     const ModelReplaced replaced{model.wishes};
     journal_.Note(Transition(*active, replaced).job.record, model.wishes.Wanting());
     jobs_.Apply(wanted.digest, replaced);
-    return;
+    return absl::OkStatus();
   }
   JobRecord record = NewRecord(wanted, clock_.UnixMs());
-  const absl::Status stored = journal_.Put(record, model.wishes.Wanting());
-  if (!stored.ok()) return events_.LogUnstored("transfer", record.digest, stored);
+  RETURN_IF_ERROR(journal_.Put(record, model.wishes.Wanting()));
   JobOrigin origin{.client = model.client};
   origin.wishes.Add(model.wishes);
   Enqueue(std::move(record), std::move(wanted.request), std::move(origin));
+  return absl::OkStatus();
 }
 
 void JobRuns::StartWhatFits(Notices& notices) {
@@ -165,39 +175,61 @@ void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
   phases_.End(digest, clock_.Monotonic());
   const RunEnded end{Store(digest, outcome)};
   if (end.outcome.verdict == Verdict::kOk) CopyToWaiting(digest);
-  Notices notices;
-  {
-    MutexLock lock(&writer_);
-    End(digest, end, notices);
+  bool followed = false;
+  absl::Status stored;
+  for (bool told = false; !told || !stored.ok(); told = true) {
+    if (told) std::this_thread::sleep_for(kPauseBeforeStoring);
+    Notices notices;
+    {
+      MutexLock lock(&writer_);
+      stored = TryEnd(digest, end, followed, notices);
+    }
+    TellAll(notices);
+    if (!told) events_.LogUnstored("job", digest, stored);
   }
-  TellAll(notices);
 }
 
-void JobRuns::End(const std::string& digest, const RunEnded& end, Notices& notices) {
+// Returns why the end has to wait until it can be stored, or OK. `followed` says whether the job's
+// transfer is in the queue, and is kept for the next attempt.
+absl::Status JobRuns::TryEnd(const std::string& digest, const RunEnded& end, bool& followed,
+                             Notices& notices) {
   const bool succeeded = end.outcome.verdict == Verdict::kOk;
-  const ActiveJob job = jobs_.EndRun(digest, succeeded ? end.outcome.peak_bytes : 0);
+  const ActiveJob job = *jobs_.Find(digest);
+  const JobStep step = Transition(job, end);
+  const bool ends = step.action == JobAction::kEnd;
+  if (ends && !job.deleted()) {
+    absl::Status stored = StoreEnd(job, step.job.record, followed);
+    if (IsStoredLater(stored) && !stopping_) return stored;
+    events_.LogUnstored("job", digest, stored);
+  }
+  jobs_.EndRun(digest, succeeded ? end.outcome.peak_bytes : 0);
   if (succeeded && job.record.transfer_of.empty()) journal_.NoteExperience(jobs_.experience());
   const double run_s = std::chrono::duration<double>(clock_.Monotonic() - job.started).count();
   mean_run_s_ += kWeightOfNewestRun * (run_s - mean_run_s_);
   // Fails if the model was deleted before it was stored: then there is none.
   if (job.deleted() && database_.models().Delete(digest).ok()) events_.LogDeletedResult(digest);
-  const JobStep step = Transition(job, end);
   if (!step.note.empty()) settings_.log(step.note);
-  const bool ends = step.action == JobAction::kEnd;
-  if (ends && succeeded && !job.deleted()) FollowByTransfer(job);
-  if (ends) NoteEnd(step.job);
+  if (ends) CountEnd(step.job);
   notices.push_back(jobs_.Apply(digest, end));
   if (ends) ReleaseWaiting(digest, notices);
   StartWhatFits(notices);
   for (Notice& news : jobs_.NewsOfWaiting()) notices.push_back(std::move(news));
+  return absl::OkStatus();
 }
 
-// If the end cannot be stored, the row still says queued, and the next start of the daemon ends the
-// job.
-void JobRuns::NoteEnd(const ActiveJob& job) {
+// If the daemon stops before the end can be stored, the row still says queued, and the next start
+// of the daemon ends the job.
+absl::Status JobRuns::StoreEnd(const ActiveJob& job, const JobRecord& ended, bool& followed) {
+  if (ended.state == v1::JOB_STATE_SUCCEEDED && !followed) {
+    RETURN_IF_ERROR(FollowByTransfer(job));
+    followed = true;
+  }
+  return journal_.Put(ended);
+}
+
+void JobRuns::CountEnd(const ActiveJob& job) {
   const v1::JobState state = job.record.state;
   if (state == v1::JOB_STATE_FAILED) events_.LogFailure(job.record, job.client);
-  if (!job.deleted()) journal_.Note(job.record);
   const MutexLock lock(&ended_mutex_);
   ended_.succeeded += state == v1::JOB_STATE_SUCCEEDED ? 1 : 0;
   ended_.failed += state == v1::JOB_STATE_FAILED ? 1 : 0;
@@ -205,8 +237,8 @@ void JobRuns::NoteEnd(const ActiveJob& job) {
 }
 
 // Puts the model or the transfer into the database, without the writer's lock. An error in storing
-// it is then the outcome of the job. While another process holds the database, the result of what
-// may have been hours of work waits.
+// it is then the outcome of the job. While another process holds the database, or the disk is full,
+// the result of what may have been hours of work waits.
 Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
   if (outcome.verdict != Verdict::kOk) return outcome;
   absl::Status stored;
@@ -216,9 +248,10 @@ Outcome JobRuns::Store(const std::string& digest, const Outcome& outcome) {
     if (job->deleted() || cancelled) return {Verdict::kCancelled, {}, {}};
     stored = PutResult(job->record, outcome.model_file);
     if (stored.ok()) return outcome;
-    if (ToErrorInfo(stored).reason() != "DATABASE_BUSY" || stops()) break;
+    if (!IsStoredLater(stored) || stops()) break;
     if (!told)
       settings_.log(absl::StrCat("the result of jobs/", digest, " waits: ", stored.message()));
+    std::this_thread::sleep_for(kPauseBeforeStoring);
   }
   return {Verdict::kCrashed, ToErrorInfo(stored), {}};
 }

@@ -28,7 +28,9 @@ struct JobOrigin {
   std::string waits_for{};
 };
 
-/// Starts queued jobs on the executor, stores their results and queues the jobs that follow.
+/// Starts queued jobs on the executor, stores their results and queues the jobs that follow. A job
+/// runs until its result and its end are stored, so both wait for space on the disk, and keep the
+/// executor's thread for files.
 class JobRuns {
  public:
   using Notices = std::vector<Notice>;
@@ -72,16 +74,18 @@ class JobRuns {
   void OnProgress(const std::string& digest, const v1::Progress& progress);
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
-  void End(const std::string& digest, const RunEnded& end, Notices& notices)
+  absl::Status TryEnd(const std::string& digest, const RunEnded& end, bool& followed,
+                      Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  absl::Status StoreEnd(const ActiveJob& job, const JobRecord& ended, bool& followed)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
-  void NoteEnd(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  void CountEnd(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   void CopyToWaiting(const std::string& coarse) ABSL_LOCKS_EXCLUDED(writer_);
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   Outcome Store(const std::string& digest, const Outcome& outcome);
   absl::Status PutResult(const JobRecord& job, const std::filesystem::path& file);
   bool stops() const ABSL_LOCKS_EXCLUDED(writer_);
-  void FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  absl::Status FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   ModeDatabase& database_;
   const Clock& clock_;

@@ -8,14 +8,18 @@
 #include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <semaphore>
 #include <thread>
+#include <utility>
 
+#include "absl/strings/match.h"
 #include "proto/cpp/material_catalogue.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/job/decomposition_request.h"
 #include "server/decomposition/job/wanted_job.h"
 #include "server/decomposition/worker/local_executor.h"
 #include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/mode_database/faulty_vfs.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
 namespace carillon {
@@ -57,6 +61,11 @@ class Ending {
     return job_;
   }
 
+  bool HasEnded() {
+    const std::lock_guard lock(mutex_);
+    return job_.state() >= v1::JOB_STATE_SUCCEEDED;
+  }
+
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -82,18 +91,18 @@ class TransferJobTest : public ::testing::Test {
                                                                  .power_integrals = {1, 2, 3}}));
   }
 
-  void Open() {
+  void Open(const std::string& name = "carillon.db") {
     queue_.reset();
     database_.reset();
-    database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
+    database_ = *ModeDatabase::Open(folder_ / name, clock_);
   }
 
-  void MakeQueue(const std::string& script, bool transfers = true) {
+  void MakeQueue(const std::string& script, QueueSettings settings = {.transfers = true}) {
     queue_.reset();
     options_.program = WriteWorkerScript(folder_.path(), absl::StrCat(kKind, script));
     options_.directory = folder_ / "running";
     queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options_, clock_), clock_,
-                                       {.transfers = transfers});
+                                       std::move(settings));
   }
 
   void Submit() {
@@ -119,6 +128,41 @@ class TransferJobTest : public ::testing::Test {
   std::unique_ptr<DecompositionQueue> queue_;
 };
 
+// The disk becomes full at each of the writes that follow a run, and has space again once the queue
+// has said that something waits for it.
+TEST_F(TransferJobTest, AFullDiskLosesNeitherTheEndOfAJobNorItsTransfer) {
+  const FaultyDisk disk;
+  const Gate gate(folder_ / "gate");
+  int failed_count = 0;
+  for (int good_count = 0; good_count < 24; good_count += 3) {
+    SCOPED_TRACE(good_count);
+    Open(absl::StrCat("full", good_count, ".db"));
+    database_->meshes().Put("solid").status().IgnoreError();
+    std::counting_semaphore<> waits(0);
+    MakeQueue(absl::StrCat("case $kind in model) read line <\"$here/gate\";; esac\n", kSucceed),
+              {.transfers = true,
+               .log = [&](const std::string&) { waits.release(); },
+               .log_event =
+                   [&](const Event& event) {
+                     if (absl::StartsWith(event.ToLine(), "job_not_stored what=job "))
+                       waits.release();
+                   }});
+    Submit();
+    Ending model(*queue_, digest_);
+    FaultyDisk::FailAfter(good_count, DiskFault::kFull);
+    gate.Open();
+    while (!waits.try_acquire_for(std::chrono::milliseconds(10)) && !model.HasEnded()) {
+    }
+    failed_count += FaultyDisk::Repair() ? 1 : 0;
+    EXPECT_EQ(model.Await().state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(database_->jobs().Find(digest_)->value().state, v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(TransferCount(), 1U);
+    queue_.reset();  // before what it tells
+  }
+  EXPECT_GT(failed_count, 5);
+}
+
 TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
   MakeQueue(kSucceed);
   Submit();
@@ -136,7 +180,7 @@ TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
 }
 
 TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
-  MakeQueue(kSucceed, false);
+  MakeQueue(kSucceed, {});
   Submit();
   AwaitEnd(digest_);
   MakeQueue(kSucceed);
@@ -150,7 +194,7 @@ TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
 }
 
 TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
-  MakeQueue(kSucceed, false);
+  MakeQueue(kSucceed, {});
   Submit();
   AwaitEnd(digest_);
   v1::CreateTransferRequest wanted;
