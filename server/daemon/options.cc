@@ -351,6 +351,19 @@ void AddDatabaseCommands(CLI::App& app, CommandLine& command) {
       ->required();
 }
 
+/// Returns the text of a usage error. That of the library for a word after "db" that is no command
+/// does not name the word.
+std::string MistakeText(int argc, const char* const* argv, const CLI::ParseError& error) {
+  const char* const* const end = argv + argc;
+  const char* const* const db = std::find(argv, end, absl::string_view("db"));
+  if (db == end || error.get_name() != "RequiredError") return error.what();
+  const absl::string_view word = db + 1 == end ? "" : db[1];
+  if (word == "restore") return error.what();
+  return absl::StrCat(
+      word.empty() ? "db needs a command" : absl::StrCat("there is no command 'db ", word, "'"),
+      ": give check or restore; `carillon db backup` copies the database while the daemon runs");
+}
+
 /// Parses the command line into `command`. Returns false if the program is not to run, because the
 /// help or the version was printed.
 absl::StatusOr<bool> ParseFlags(int argc, const char* const* argv, const std::string& version,
@@ -369,7 +382,7 @@ absl::StatusOr<bool> ParseFlags(int argc, const char* const* argv, const std::st
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) return InvalidConfiguration(error.what());
+    if (error.get_exit_code() != 0) return InvalidConfiguration(MistakeText(argc, argv, error));
     app.exit(error);
     return false;
   }

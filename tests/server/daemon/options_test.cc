@@ -56,6 +56,13 @@ TEST_F(OptionsFile, FlagsWinOverTheFileAndTheFileOverTheDefaults) {
   EXPECT_EQ(command->options.audio_device, "auto");
 }
 
+TEST(Options, AWordThatIsNoCommandOfTheDatabaseIsNamedWithTheProgramThatHasIt) {
+  EXPECT_THAT(Read({"db", "backup", "backup.db"}).status().message(),
+              testing::AllOf(HasSubstr("'db backup'"), HasSubstr("`carillon db backup`")));
+  EXPECT_THAT(Read({"db"}).status().message(), HasSubstr("check or restore"));
+  EXPECT_THAT(Read({"db", "restore"}).status().message(), HasSubstr("FILE"));
+}
+
 TEST_F(OptionsFile, TheFileInTheConfigurationDirectoryIsReadIfNoOtherIsNamed) {
   const std::filesystem::path file = Write("sample_rate = 44100\n");
   setenv("CONFIGURATION_DIRECTORY", file.parent_path().c_str(), 1);
