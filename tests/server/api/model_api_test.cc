@@ -211,7 +211,8 @@ TEST_F(ModelApi, AnExportWithoutShapesHasEveryOtherArrayUnchanged) {
 
 TEST_F(ModelApi, ShapesOfModesAtVerticesAreThoseOfTheModelTo16Bits) {
   const std::string name = ImportSmallModel();
-  const ModalModel& model = *SmallModel();
+  const std::shared_ptr<const ModalModel> small_model = SmallModel();
+  const ModalModel& model = *small_model;
   const auto mode_count = static_cast<uint32_t>(model.mode_count());
   std::vector<v1::ModeShape> shapes;
   ASSERT_TRUE(GetShapes(name, {mode_count - 1, 0}, {2, 1}, shapes).ok());

@@ -211,7 +211,7 @@ TEST_F(VolumeApi, AWatcherSeesEachBlowAndTheReportsOfTheStreamsOfItsScene) {
   EXPECT_EQ(report.SerializeAsString(), last.SerializeAsString());
   ASSERT_EQ(blows.size(), 1U);
   EXPECT_EQ(blows[0].object(), 1U);
-  const v1::Vec3& struck = Strike(1).impulse_newton_seconds();
+  const v1::Vec3 struck = Strike(1).impulse_newton_seconds();
   EXPECT_NEAR(blows[0].impulse_newton_seconds().x(), struck.x(), 1e-6);
   EXPECT_NEAR(blows[0].impulse_newton_seconds().y(), struck.y(), 1e-6);
   EXPECT_NEAR(blows[0].impulse_newton_seconds().z(), struck.z(), 1e-6);
