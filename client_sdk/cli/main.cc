@@ -175,9 +175,11 @@ void AddStrike(CLI::App& app, Program& program) {
                   "The duration of the contact, s [that of an elastic collision with the striker]")
       ->excludes(striker);
   AddStruckObject(strike, *options);
-  TakeWithin(*strike.add_option("--seconds", options->seconds,
-                                "The time to ring, s [until the sound has decayed by 60 dB]"),
-             0.001, 1e9, "leave --seconds out to hear the sound until it has decayed");
+  TakeWithin(
+      *strike.add_option("--seconds", options->seconds,
+                         "The time to ring, s [until the sound is 60 dB below its peak, at most "
+                         "30 s, and 60 s in a file]"),
+      0.001, 1e9, "leave --seconds out to hear the sound until it has decayed");
   AddMaterial(strike, options->material);
   AddStrikeFile(strike, *options);
   strike.callback([&program, options] {

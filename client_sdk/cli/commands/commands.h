@@ -240,8 +240,8 @@ inline constexpr double kLeastFullScale_pa = 0.00002;
 /// at which it does not work.
 inline constexpr double kLimiterHeadroom = 1.4126;
 /// Returns the full scale, Pa, with which a sound should be rendered again before it is normalised.
-/// Tails end at -80 dB and modes at -140 dB of full scale, so that a soft sound would be cut, and
-/// the limiter changes a loud one. Returns nothing if the rendering is neither soft nor limited, is
+/// Modes end at -140 dB of full scale, so that a soft sound would be cut, and the limiter changes a
+/// loud one. Returns nothing if the rendering is neither soft nor limited, is
 /// silent, or has the full scale that was asked for.
 std::optional<double> BetterFullScale(const RenderOptions& options,
                                       const v1::RenderSummary& summary);

@@ -85,7 +85,7 @@ class Gallery:
         struck = trace.add(self.model(body, material), size=size)
         point = [size * x for x in point]
         trace.step(0.0, impacts=carillon.Impacts(struck, [point], [impulse], striker=striker))
-        # A rendering ends at -80 dB of its full scale.
+        # Modes end at -140 dB of full scale.
         peak_pa = self.client.render(trace).summary.peak_pa
         sound = self.client.render(trace, full_scale_pa=2 * peak_pa, sample_rate_hz=SAMPLE_RATE_HZ).normalized(0.7)
         samples = sound.mono[:seconds * SAMPLE_RATE_HZ]

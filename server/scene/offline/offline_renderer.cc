@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,11 +16,14 @@ namespace {
 
 constexpr double kLongestTailS = 120;
 constexpr double kLongestOpenTailS = 60;
-/// -80 dB of full scale.
+/// The sound has ended below -80 dB of full scale, if that is also 60 dB below its peak.
 constexpr float kQuiet = 1e-4F;
+constexpr float kQuietOfPeak = 1e-3F;
 /// The sound must stay quiet for this time, because two modes that beat are silent together for a
 /// while.
 constexpr double kQuietS = 0.25;
+/// The sound that is left at the end fades out over this time, because a cut clicks.
+constexpr double kFadeS = 0.01;
 
 bool IsSilent(std::span<const float> samples) {
   return std::ranges::all_of(samples, [](float x) { return x == 0; });
@@ -47,9 +51,13 @@ size_t OfflineRenderer::Render(std::span<float> samples) {
     may_have_ended_ = false;
     quiet_frame_count_ = 0;
   }
-  if (!may_have_ended_) given = GiveHeld(samples);
-  while (held_.empty() || may_have_ended_) {
-    if (may_have_ended_ && forward_->finished()) break;
+  if (!may_have_ended_ || ended_) given = GiveHeld(samples);
+  while (!ended_ && (held_.empty() || may_have_ended_)) {
+    if (may_have_ended_ && forward_->finished() && HeldFrames() >= FadeFrames()) {
+      FadeHeld();
+      given += GiveHeld(samples.subspan(given * channel_count));
+      break;
+    }
     const size_t count = CountReady((room - given) / kBlockFrameCount);
     if (count == 0) break;
     const size_t first = given;
@@ -82,13 +90,14 @@ size_t OfflineRenderer::CountReady(size_t most) const {
 /// `frame` is the number of the block's first frame.
 size_t OfflineRenderer::KeepBlock(std::span<const float> block, uint64_t frame) {
   size_t count = 0;
+  for (const float x : block) loudest_ = std::max(loudest_, std::abs(x));
   if (!may_have_ended_) {
     const uint64_t left = EndFrame() - std::min(frame, EndFrame());
     count = static_cast<size_t>(std::min<uint64_t>(kBlockFrameCount, left));
     may_have_ended_ = left <= kBlockFrameCount || StaysQuiet(block, frame);
     contact_frame_ = forward_->last_contact_frame();
   }
-  if (!forward_->finished()) Hold(block.subspan(count * forward_->settings().channel_count));
+  Hold(block.subspan(count * forward_->settings().channel_count));
   return count;
 }
 
@@ -96,8 +105,9 @@ size_t OfflineRenderer::KeepBlock(std::span<const float> block, uint64_t frame) 
 /// this block.
 bool OfflineRenderer::StaysQuiet(std::span<const float> block, uint64_t frame) {
   const OfflineSettings& settings = forward_->settings();
+  const float least = std::min(kQuiet, kQuietOfPeak * loudest_);
   const bool quiet = frame + kBlockFrameCount > forward_->last_contact_frame() &&
-                     std::ranges::all_of(block, [](float x) { return std::abs(x) < kQuiet; });
+                     std::ranges::all_of(block, [&](float x) { return std::abs(x) <= least; });
   quiet_frame_count_ = quiet ? quiet_frame_count_ + kBlockFrameCount : 0;
   // Sound may still be on its way to the listener.
   const double delay_s = settings.space.hearing.propagation_delay ? kLongestPropagationS : 0;
@@ -105,11 +115,38 @@ bool OfflineRenderer::StaysQuiet(std::span<const float> block, uint64_t frame) {
          static_cast<double>(quiet_frame_count_) >= (kQuietS + delay_s) * settings.sample_rate_hz;
 }
 
+/// Returns the frame at which the fade begins at the latest. A tail that is given includes it.
 uint64_t OfflineRenderer::EndFrame() const {
   const OfflineSettings& settings = forward_->settings();
-  const double tail_s = settings.tail_s > 0 ? settings.tail_s : kLongestOpenTailS;
+  const bool is_given = settings.tail_s > 0;
+  const double tail_s = is_given ? settings.tail_s : kLongestOpenTailS;
   return forward_->last_contact_frame() +
-         static_cast<uint64_t>(std::ceil(tail_s * settings.sample_rate_hz));
+         static_cast<uint64_t>(std::ceil(tail_s * settings.sample_rate_hz)) -
+         (is_given ? FadeFrames() : 0);
+}
+
+size_t OfflineRenderer::FadeFrames() const {
+  const OfflineSettings& settings = forward_->settings();
+  const double fade_s = settings.tail_s > 0 ? std::min(kFadeS, settings.tail_s) : kFadeS;
+  return static_cast<size_t>(std::ceil(fade_s * settings.sample_rate_hz));
+}
+
+/// Lets the frames that were kept back fade out, and drops those after the fade.
+void OfflineRenderer::FadeHeld() {
+  const size_t channel_count = forward_->settings().channel_count;
+  const size_t fade = FadeFrames();
+  size_t faded = 0;
+  for (Held& held : held_) {
+    held.frame_count = std::min(held.frame_count, fade - faded);
+    held.samples.resize(std::min(held.samples.size(), held.frame_count * channel_count));
+    for (size_t i = 0; i < held.samples.size(); ++i) {
+      const double part =
+          static_cast<double>(faded + i / channel_count) / static_cast<double>(fade);
+      held.samples[i] *= static_cast<float>(0.5 + 0.5 * std::cos(std::numbers::pi * part));
+    }
+    faded += held.frame_count;
+  }
+  ended_ = true;
 }
 
 void OfflineRenderer::Hold(std::span<const float> samples) {
@@ -145,6 +182,12 @@ size_t OfflineRenderer::GiveHeld(std::span<float> samples) {
     held_.pop_front();
   }
   return given;
+}
+
+size_t OfflineRenderer::HeldFrames() const {
+  size_t count = 0;
+  for (const Held& held : held_) count += held.frame_count;
+  return count;
 }
 
 size_t OfflineRenderer::held_bytes() const {

@@ -30,7 +30,7 @@ struct OfflineSummary {
 /// Renders a recorded simulation from its first frame to the end of its sound. Steps may be given
 /// to the renderer while it renders. As long as steps may follow, the sound after its possible end
 /// is kept back, because poses after the last contact do not make the sound longer; of silence only
-/// the length is kept. Only one thread at a time may use an object.
+/// the length is kept. The end fades out over 10 ms. Only one thread at a time may use an object.
 class OfflineRenderer {
  public:
   static constexpr size_t kBlockFrameCount = kOfflineBlockFrames;
@@ -72,14 +72,19 @@ class OfflineRenderer {
   bool StaysQuiet(std::span<const float> block, uint64_t frame);
   void Hold(std::span<const float> samples);
   size_t GiveHeld(std::span<float> samples);
+  size_t HeldFrames() const;
+  void FadeHeld();
   uint64_t EndFrame() const;
+  size_t FadeFrames() const;
 
   std::unique_ptr<ForwardRenderer> forward_;
   std::deque<Held> held_;
   bool may_have_ended_ = false;  // whether the sound ends here unless a contact follows
+  bool ended_ = false;           // whether `held_` has the fade alone
   uint64_t contact_frame_ = 0;   // last_contact_frame() when may_have_ended_ was set
   uint64_t quiet_frame_count_ = 0;
   uint64_t frame_count_ = 0;
+  float loudest_ = 0;  // sample so far, after the limiter
   double peak_ = 0;
 };
 

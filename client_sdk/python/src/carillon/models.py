@@ -105,7 +105,7 @@ class ModelCalls:
         """Renders one strike without a scene and faster than real time. The samples are the same each time once the
         transfer of the model is computed (wait_for_transfer). `duration` is that of the contact, in seconds; without it
         the `striker`, such as "wood", determines it. `gain` is a linear factor: 10 ** (x / 20) is x dB. `seconds`
-        zero means until the sound has died away."""
+        zero means until the sound is 60 dB below its peak, and 60 s at most. The last 10 ms fade out."""
         trace = Trace(simulator="carillon (Python)")
         body = trace.add(self, material, size=size, gain=gain)
         trace.step(0.0, impacts=strike_of(body, point, impulse, duration, striker))

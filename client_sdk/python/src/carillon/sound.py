@@ -48,7 +48,7 @@ class Sound:
         return mean
 
     def normalized(self, peak: float = 0.9) -> Sound:
-        """Returns the sound with this peak; silence stays silent. The tail of a rendering ends at -80 dB of full scale
+        """Returns the sound with this peak; silence stays silent. The modes of a rendering end at -140 dB of full scale
         all the same: for a soft sound use Client.render(trace, normalize=True), or give it a full_scale_pa."""
         return dataclasses.replace(self, samples=self.samples * (peak / self.peak if self.peak else 1))
 

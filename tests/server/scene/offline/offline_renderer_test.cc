@@ -19,6 +19,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr uint32_t kRate = 48000;
+constexpr size_t kFadeFrames = kRate / 100;
 
 /// Strikes at times that are no multiple of a block, some at the same time, not all in order within
 /// their step.
@@ -99,7 +100,8 @@ TEST_F(OfflineRendererTest, IsBitForBitWhatTheLiveMixerRenders) {
     StrikeAt(*renderer, time_s, impulse);
   });
   EXPECT_EQ(stream->first_frame(), before.size());
-  const std::vector<float> offline = RenderAll(*renderer, 8);
+  std::vector<float> offline = RenderAll(*renderer, 8);
+  offline.resize(offline.size() - kFadeFrames);
   std::vector<float> live((offline.size() + 127) / 128 * 128);
   mixer.Render(live);
   live.resize(offline.size());
@@ -152,7 +154,7 @@ std::vector<float> RenderPlaced(const SceneSpace& space, size_t thread_count,
   });
   std::vector<float> sound(size_t{2} * 48000 * 3);
   renderer->forward().Finish();
-  sound.resize(2 * renderer->Render(sound));
+  sound.resize(2 * (renderer->Render(sound) - kFadeFrames));
   EXPECT_EQ(renderer->summary().rejected_count, 0U);
   return sound;
 }
@@ -225,10 +227,10 @@ TEST_F(OfflineRendererTest, KeepsTheSoundBackThatMayLieAfterItsEnd) {
   StrikeAt(*renderer, 0, SmallImpulse(1));
   ASSERT_TRUE(renderer->intake().BeginStep(2).ok());
   std::vector<float> sound(size_t{3} * kRate);
-  EXPECT_EQ(renderer->Render(sound), 0.1 * kRate);
+  EXPECT_EQ(renderer->Render(sound), 0.1 * kRate - kFadeFrames);
   StrikeAt(*renderer, 2, SmallImpulse(1));
   renderer->forward().Finish();
-  EXPECT_EQ(renderer->Render(sound), 2 * kRate);
+  EXPECT_EQ(renderer->Render(sound), 2 * kRate + kFadeFrames);
 }
 
 /// Steps of poses alone go on for ten minutes after a contact, and another contact follows.
@@ -260,23 +262,50 @@ TEST_F(OfflineRendererTest, TakesNoMemoryForALongSilence) {
   EXPECT_EQ(renderer->summary().accepted_count, 2U);
 }
 
-TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80Db) {
-  const auto renderer = Make();
-  StrikeAt(*renderer, 0, SmallImpulse(1));
-  const std::vector<float> sound = RenderAll(*renderer, 8);
-  const auto loud = [](float x) { return std::abs(x) >= 1e-4F; };
-  const auto last_loud = std::ranges::find_if(sound.rbegin(), sound.rend(), loud);
-  const auto quiet_frame_count = last_loud - sound.rbegin();
-  ASSERT_NE(last_loud, sound.rend());
-  EXPECT_GE(quiet_frame_count, kRate / 4);            // it listens for that long
-  EXPECT_LT(quiet_frame_count, kRate / 4 + 2 * 128);  // and not for longer
-  EXPECT_FALSE(loud(sound.back()));
+/// A strike of 1 N s is loud enough to end at -80 dB of full scale, and the others are not.
+TEST_F(OfflineRendererTest, EndsOnceAllIsBelowMinus80DbAnd60DbBelowItsPeak) {
+  for (const double newton_seconds : {1.0, 0.1, 0.01}) {
+    const auto renderer = Make();
+    StrikeAt(*renderer, 0, SmallImpulse(1, newton_seconds));
+    const std::vector<float> sound = RenderAll(*renderer, 8);
+    float peak = 0;
+    for (const float x : sound) peak = std::max(peak, std::abs(x));
+    const float least = std::min(1e-4F, 1e-3F * peak);
+    const auto last_loud =
+        std::find_if(sound.rbegin(), sound.rend(), [&](float x) { return std::abs(x) > least; });
+    const auto quiet_frame_count = static_cast<size_t>(last_loud - sound.rbegin());
+    ASSERT_NE(last_loud, sound.rend());
+    EXPECT_GE(quiet_frame_count, kRate / 4 + kFadeFrames);            // it listens for that long
+    EXPECT_LT(quiet_frame_count, kRate / 4 + kFadeFrames + 2 * 128);  // and not for longer
+  }
 }
 
 TEST_F(OfflineRendererTest, ATailThatIsGivenIsKeptToTheFrame) {
-  const auto renderer = Make(0.1);
-  StrikeAt(*renderer, 0.05, SmallImpulse(1));
-  EXPECT_EQ(RenderAll(*renderer, 8).size(), 0.15 * kRate);
+  for (const double tail_s : {0.1, 0.004}) {
+    const auto renderer = Make(tail_s);
+    StrikeAt(*renderer, 0.05, SmallImpulse(1));
+    EXPECT_EQ(RenderAll(*renderer, 8).size(), std::round((0.05 + tail_s) * kRate));
+  }
+}
+
+/// The gain of the last 10 ms falls as half a period of a cosine, whether the end is given or
+/// found. Before them the samples are those of a longer rendering.
+TEST_F(OfflineRendererTest, FadesOutAtItsEnd) {
+  const auto render = [&](double tail_s, size_t blocks_at_a_time) {
+    const auto renderer = Make(tail_s);
+    StrikeAt(*renderer, 0, SmallImpulse(1));
+    return RenderAll(*renderer, blocks_at_a_time);
+  };
+  const std::vector<float> longer = render(4, 64);
+  for (const double tail_s : {0.0, 0.1}) {
+    const std::vector<float> sound = render(tail_s, 1);
+    ASSERT_LT(sound.size(), longer.size());
+    for (size_t i = 0; i < sound.size(); ++i) {
+      const size_t left = std::min(sound.size() - i, kFadeFrames);
+      const double phase = M_PI * static_cast<double>(kFadeFrames - left) / kFadeFrames;
+      ASSERT_EQ(sound[i], longer[i] * static_cast<float>(0.5 + 0.5 * std::cos(phase))) << i;
+    }
+  }
 }
 
 TEST_F(OfflineRendererTest, CountsWhatSoundedAndWhatCouldNotBeUsed) {
