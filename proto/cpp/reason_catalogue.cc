@@ -28,24 +28,23 @@ bool IsName(absl::string_view cell) {
 }
 
 /// Reads the rows of the groups of reasons (name, codes, meaning, repair), of the section
-/// "Warnings" (name, meaning, counts, figures), and of findings (name, meaning, repair).
+/// "Warnings" (name, meaning, counts, figures, repair), and of findings (name, meaning, repair).
 std::vector<CatalogueReason> ReadTables() {
   std::vector<CatalogueReason> reasons;
   absl::string_view group;
   for (const absl::string_view line : absl::StrSplit(kPages, '\n')) {
     if (absl::StartsWith(line, "## ")) group = line.substr(3);
     const std::vector<std::string> cells = absl::StrSplit(line, " | ");
-    const bool is_finding = cells.size() == 3;
-    if ((cells.size() != 4 && !is_finding) || !absl::StartsWith(line, "| ")) continue;
+    if (cells.size() < 3 || cells.size() > 5 || !absl::StartsWith(line, "| ")) continue;
     const std::string name = cells[0].substr(2);
     if (!IsName(name)) continue;
     CatalogueReason& reason = reasons.emplace_back();
     reason.name = name;
     reason.group = std::string(group);
-    const bool has_code = !is_finding && group != "Warnings";
+    const bool has_code = cells.size() == 4;
     if (has_code) reason.code = cells[1];
     reason.meaning = cells[has_code ? 2 : 1];
-    if (has_code || is_finding) reason.repair = std::string(absl::StripSuffix(cells.back(), " |"));
+    reason.repair = std::string(absl::StripSuffix(cells.back(), " |"));
   }
   return reasons;
 }

@@ -48,11 +48,9 @@ absl::Status Validate(const HertzContact& hertz) {
 
 absl::Status ValidatePoint(const Point& point) {
   if (Finite(point)) return absl::OkStatus();
-  return Invalid(
-      "CONTACT_MALFORMED",
-      absl::StrCat("the point of contact ", Text(point),
-                   " has a coordinate that is not a finite number: send metres in the object's "
-                   "frame"));
+  return Invalid("CONTACT_MALFORMED",
+                 absl::StrCat("the point of contact ", Text(point),
+                              " has a coordinate that is not a finite number: send metres"));
 }
 
 absl::Status ValidateWeights(const std::array<double, 3>& weights) {
@@ -71,8 +69,8 @@ absl::Status Validate(const ContactImpulse& contact) {
     return Invalid(
         "CONTACT_MALFORMED",
         absl::StrCat("the impulse ", Text(contact.impulse_newton_seconds),
-                     " has a component that is not a finite number, or is beyond 3.4e38: send N s "
-                     "in the object's frame"));
+                     " has a component that is not a finite number, or is beyond 3.4e38: send N "
+                     "s"));
   }
   const double duration_s = contact.duration_s.value_or(0);
   if (!(duration_s >= 0 && duration_s <= kLongestContactS)) {

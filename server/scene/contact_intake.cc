@@ -47,8 +47,9 @@ ContactIntake::ContactIntake(Scene& scene, EventTarget& target, const IntakeSett
       time_s_(mapper_.mapping().first_time_s),
       diagnostics_(settings.step_s, settings.rejections),
       gatherer_(settings.step_s),
-      balance_(settings.step_s, settings.reading.scene_frame),
-      pose_times_(settings.step_s) {}
+      pose_times_(settings.step_s) {
+  if (settings.balances) balance_.emplace(settings.step_s, settings.reading.scene_frame);
+}
 
 absl::Status ContactIntake::BeginStep(double time_s, double time_scale) {
   if (!(std::abs(time_s) <= kLargestStepTimeS)) {
@@ -162,7 +163,7 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   RETURN_IF_ERROR(Validate(touch.roughness));
   RETURN_IF_ERROR(FrameOfImpulse(touch.time_offset_s).status());
   if (diagnostics_.NoteZero(touch.contact)) {
-    balance_.TouchWithout(touch.contact.handle);
+    if (balance_) balance_->TouchWithout(touch.contact.handle);
     return scene_.Find(touch.contact.handle).status();
   }
   if (!gatherer_.HasRoom(touch)) {
@@ -173,12 +174,12 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   }
   BodyImpulses impulses;
   RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, impulses));
-  for (const BodyImpulse& one : impulses.all()) {
-    balance_.Touch({.handle = one.handle,
-                    .mass_kg = one.mass_kg,
-                    .impulse_newton_seconds = one.impulse().impulse_newton_seconds,
-                    .vertices = one.impulse().at.vertices,
-                    .weights = one.impulse().at.weights});
+  for (const BodyImpulse& one : balance_ ? impulses.all() : std::span<const BodyImpulse>()) {
+    balance_->Touch({.handle = one.handle,
+                     .mass_kg = one.mass_kg,
+                     .impulse_newton_seconds = one.impulse().impulse_newton_seconds,
+                     .vertices = one.impulse().at.vertices,
+                     .weights = one.impulse().at.weights});
   }
   gatherer_.Touch(touch, impulses);
   return absl::OkStatus();
@@ -192,12 +193,15 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   RETURN_IF_ERROR(CheckAhead(FrameOf(time_s_)));
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Move(handle, pose));
-  const Quaternion orientation = Normalized(pose.orientation);
-  Vector3 centre = object->body->centre_m;
-  for (double& component : centre) component *= object->properties.material.size;
-  centre = Rotated(centre, orientation);
-  for (size_t axis = 0; axis < 3; ++axis) centre[axis] += pose.position_m[axis];
-  if (!pauses_) balance_.Move(handle, centre, orientation);
+  moved_ = true;
+  if (balance_ && !pauses_) {
+    const Quaternion orientation = Normalized(pose.orientation);
+    Vector3 centre = object->body->centre_m;
+    for (double& component : centre) component *= object->properties.material.size;
+    centre = Rotated(centre, orientation);
+    for (size_t axis = 0; axis < 3; ++axis) centre[axis] += pose.position_m[axis];
+    balance_->Move(handle, centre, orientation);
+  }
   if (object->voice == nullptr) return absl::OkStatus();
   const double glide_s = pose_times_.GlideS(handle, time_s_);
   MixerEvent move{.bank = object->bank, .action = ObjectMove{MotionTo(pose, GlideFrames(glide_s))}};
@@ -225,7 +229,7 @@ void ContactIntake::EndStep() {
   if (pauses_) return;
   PushStruck();
   Push(gatherer_.End());
-  balance_.EndStep(time_s_);
+  if (balance_) balance_->EndStep(time_s_);
 }
 
 void ContactIntake::Finish() {

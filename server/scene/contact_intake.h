@@ -62,6 +62,8 @@ struct IntakeSettings {
   RejectionCounts* rejections = nullptr;
   /// If not null, gets each impulse that is handed on. It must outlive the intake.
   std::vector<BlowRecord>* blows = nullptr;
+  /// Whether the impulses are compared with the motion, for the mistakes of findings().
+  bool balances = true;
 };
 
 /// Takes the reports of a client about one simulation, checks them, locates them on the objects of
@@ -135,7 +137,10 @@ class ContactIntake {
   /// See Diagnostics::last_rejection.
   absl::Status last_rejection() const { return diagnostics_.last_rejection(); }
   IntakeFindings findings() const {
-    return diagnostics_.findings(gatherer_.counts(), balance_.mistakes());
+    IntakeFindings findings = diagnostics_.findings(
+        gatherer_.counts(), balance_ ? balance_->mistakes() : EngineMistakes{});
+    findings.lacks_poses = settings_.reading.scene_frame && !moved_;
+    return findings;
   }
 
  private:
@@ -188,8 +193,9 @@ class ContactIntake {
   Diagnostics diagnostics_;
   StepImpulses struck_;
   BlowGatherer gatherer_;
-  MomentumBalance balance_;
+  std::optional<MomentumBalance> balance_;
   PoseTimes pose_times_;
+  bool moved_ = false;  // whether a pose of an object has come
   uint64_t step_count_ = 0;
   uint64_t impulse_count_ = 0;
 };

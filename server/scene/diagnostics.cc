@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/shortest_decimal.h"
 
 namespace carillon {
 namespace {
@@ -73,6 +75,7 @@ void Diagnostics::NoteSpeedChange(double speed_m_per_s) {
 }
 
 void Diagnostics::Reject(uint64_t count, absl::Status reason) {
+  if (rejected_count_ == 0) first_rejected_time_s_ = time_s_.value_or(0);
   rejected_count_ += count;
   if (rejections_ != nullptr) rejections_->Add(count, reason);
   last_rejection_ = std::move(reason);
@@ -80,8 +83,15 @@ void Diagnostics::Reject(uint64_t count, absl::Status reason) {
 }
 
 absl::Status Diagnostics::last_rejection() const {
-  return last_rejection_.ok() || step_count_ <= 1 ? last_rejection_
-                                                  : AtTime(last_rejection_, last_rejected_time_s_);
+  if (last_rejection_.ok() || step_count_ <= 1) return last_rejection_;
+  const absl::Status newest = AtTime(last_rejection_, last_rejected_time_s_);
+  if (first_rejected_time_s_ == last_rejected_time_s_) return newest;
+  v1::ErrorInfo error = ToErrorInfo(newest);
+  const std::string first = ShortestDecimal(first_rejected_time_s_);
+  error.set_message(absl::StrCat("the first of ", rejected_count_, " rejections was at ", first,
+                                 " s, and the newest ", error.message()));
+  (*error.mutable_metadata())["first_time_s"] = first;
+  return FromErrorInfo(newest.code(), error);
 }
 
 IntakeFindings Diagnostics::findings(const BlowCounts& engine,

@@ -20,6 +20,7 @@ struct IntakeFindings {
   BlowCounts engine{};
   uint64_t distant_point_count = 0;      ///< points farther from the surface than 5 % of the extent
   double largest_distance_m = 0;         ///< largest distance of a point from its object's surface
+  bool lacks_poses = false;              ///< whether the frame is the scene's, and no pose has come
   uint64_t zero_impulse_count = 0;       ///< contacts without an impulse
   uint64_t too_large_impulse_count = 0;  ///< contacts rejected for their impulse
   double regular_gap_s = 0;              ///< see StepIntervals::RegularGapS
@@ -59,8 +60,9 @@ class Diagnostics {
 
   uint64_t rejected_count() const { return rejected_count_; }
 
-  /// Returns the reason of the newest rejection, with the time of its step if there are several, or
-  /// OK if no contact was rejected.
+  /// Returns the reason of the newest rejection, with the time of its step if there are several
+  /// steps, and of several rejections their number and the time of the first. Returns OK if no
+  /// contact was rejected.
   absl::Status last_rejection() const;
 
   IntakeFindings findings(const BlowCounts& engine, const EngineMistakes& mistakes) const;
@@ -77,7 +79,7 @@ class Diagnostics {
   uint64_t force_step_count_ = 0;
   uint64_t rejected_count_ = 0;
   absl::Status last_rejection_;
-  double last_rejected_time_s_ = 0;
+  double first_rejected_time_s_ = 0, last_rejected_time_s_ = 0;
   IntakeFindings findings_;
 };
 

@@ -179,11 +179,11 @@ absl::Status Explain(const std::string& name, bool json) {
       absl::PrintF("  %-30s %s\n", reason.name, reason.meaning);
     } else {
       absl::PrintF("%s (%s)\nmeaning    %s\n", reason.name,
-                   !reason.code.empty()    ? reason.code
-                   : reason.repair.empty() ? "a warning"
-                                           : "a finding of carillon doctor",
+                   !reason.code.empty()         ? reason.code
+                   : reason.group == "Warnings" ? "a warning"
+                                                : "a finding of carillon doctor",
                    reason.meaning);
-      if (!reason.repair.empty()) absl::PrintF("repair     %s\n", reason.repair);
+      absl::PrintF("repair     %s\n", reason.repair);
     }
   }
   return absl::OkStatus();

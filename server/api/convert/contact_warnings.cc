@@ -2,6 +2,7 @@
 #include "server/api/convert/contact_warnings.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -93,11 +94,35 @@ constexpr std::array<MistakeText, kEngineMistakeCount> kMistakes{{
      "or the object the engine's density"},
 }};
 
+/// Returns whether the motion is a thousand times that of the impulses, and points lie far away.
+bool CountsInMillimetres(const IntakeFindings& findings) {
+  const MistakeSize& size = findings.mistakes[static_cast<size_t>(EngineMistake::kOtherMass)];
+  return findings.distant_point_count > 0 && size.count > 0 &&
+         std::abs(std::log(1000 * size.ratio)) < std::log(2);
+}
+
+/// Returns what to do about points that are far from the surface.
+std::string WhyDistant(const IntakeFindings& findings) {
+  if (CountsInMillimetres(findings)) {
+    return "the objects moved a thousand times as fast as their impulses say, so that points and "
+           "positions are probably in millimetres: give metres";
+  }
+  if (findings.lacks_poses) {
+    return "the stated frame is the scene's, and no step had a pose of an object: send the poses "
+           "in which you found the points";
+  }
+  return "give points in metres, in the frame that was stated, which is each object's own by "
+         "default; if it is the scene's, give the poses of the objects, too, with quaternions w, "
+         "x, y, z";
+}
+
 /// Adds the warnings about the engine's mistakes, by which the motion contradicts the impulses.
 void AddMistakes(const IntakeFindings& findings, Warnings& warnings) {
   for (size_t i = 0; i < kMistakes.size(); ++i) {
     const MistakeSize& size = findings.mistakes[i];
-    if (size.count == 0) continue;
+    const bool is_of_units =
+        i == static_cast<size_t>(EngineMistake::kOtherMass) && CountsInMillimetres(findings);
+    if (size.count == 0 || is_of_units) continue;
     std::string ratio;
     if (size.ratio > 0) ratio = absl::StrFormat(", %.3g times the true impulses", size.ratio);
     v1::Warning& warning = Add(
@@ -111,47 +136,6 @@ void AddMistakes(const IntakeFindings& findings, Warnings& warnings) {
 
 bool Shows(const IntakeFindings& findings, EngineMistake mistake) {
   return findings.mistakes[static_cast<size_t>(mistake)].count > 0;
-}
-
-/// Adds the warnings about impulses and points.
-void AddContactWarnings(const IntakeFindings& findings, uint64_t accepted_count,
-                        Warnings& warnings) {
-  AddMistakes(findings, warnings);
-  const uint64_t fast_count = findings.fast_impulse_count;
-  if (fast_count > 0 && !Shows(findings, EngineMistake::kForces)) {
-    const double largest_m_per_s = findings.largest_speed_change_m_per_s;
-    v1::Warning& warning =
-        Add(warnings, "IMPULSES_TOO_FAST", fast_count,
-            absl::StrFormat("%s changed the speed of an object by up to %.3g m/s; give impulses in "
-                            "newton seconds, which are forces times the step, and no forces",
-                            Counted(fast_count, "contact"), largest_m_per_s));
-    SetFigure(warning, "largest_speed_change_m_per_s", largest_m_per_s);
-  }
-  // An impact with an impulse of zero counts as accepted, once or twice for one or two objects.
-  const uint64_t zeros = findings.zero_impulse_count;
-  const uint64_t others = findings.engine.blow_count + findings.engine.load_count;
-  const bool silent = others == 0 && 2 * zeros >= accepted_count;
-  if (silent && zeros > 0 && !Shows(findings, EngineMistake::kFirstZero)) {
-    Add(warnings, "IMPULSES_ZERO", zeros,
-        absl::StrCat("the impulse of ", Counted(zeros, "contact"),
-                     " was zero, and no other sounded; read impulses after the engine has solved "
-                     "its step, and give newton seconds"));
-  } else if (zeros >= kManyZeros && zeros >= kMostZeros * (others + accepted_count)) {
-    Add(warnings, "IMPULSES_ZERO", zeros,
-        absl::StrCat("the impulse of ", Counted(zeros, "contact"),
-                     " was zero, nearly all that were sent; leave out pairs that do not touch"));
-  }
-  if (const uint64_t count = findings.distant_point_count; count > 0) {
-    v1::Warning& warning = Add(
-        warnings, "POINTS_DISTANT", count,
-        absl::StrFormat("%s up to %.3g m away from the surface of the object, and sound%s at the "
-                        "nearest point; give points in metres, in the frame that was stated, "
-                        "which is each object's own by default; if it is the scene's, give the "
-                        "poses of the objects, too",
-                        absl::StrCat(Counted(count, "contact"), count == 1 ? " lies" : " lie"),
-                        findings.largest_distance_m, count == 1 ? "s" : ""));
-    SetFigure(warning, "largest_distance_m", findings.largest_distance_m);
-  }
 }
 
 /// Adds the warnings about contacts that were not heard in time.
@@ -199,6 +183,44 @@ void AddLossWarnings(const v1::StreamContactsResponse& report, Warnings& warning
 }
 
 }  // namespace
+
+void AddContactWarnings(const IntakeFindings& findings, uint64_t accepted_count,
+                        Warnings& warnings) {
+  AddMistakes(findings, warnings);
+  const uint64_t fast_count = findings.fast_impulse_count;
+  if (fast_count > 0 && !Shows(findings, EngineMistake::kForces)) {
+    const double largest_m_per_s = findings.largest_speed_change_m_per_s;
+    v1::Warning& warning =
+        Add(warnings, "IMPULSES_TOO_FAST", fast_count,
+            absl::StrFormat("%s changed the speed of an object by up to %.3g m/s; give impulses in "
+                            "newton seconds, which are forces times the step, and no forces",
+                            Counted(fast_count, "contact"), largest_m_per_s));
+    SetFigure(warning, "largest_speed_change_m_per_s", largest_m_per_s);
+  }
+  // An impact with an impulse of zero counts as accepted, once or twice for one or two objects.
+  const uint64_t zeros = findings.zero_impulse_count;
+  const uint64_t others = findings.engine.blow_count + findings.engine.load_count;
+  const bool silent = others == 0 && 2 * zeros >= accepted_count;
+  if (silent && zeros > 0 && !Shows(findings, EngineMistake::kFirstZero)) {
+    Add(warnings, "IMPULSES_ZERO", zeros,
+        absl::StrCat("the impulse of ", Counted(zeros, "contact"),
+                     " was zero, and no other sounded; read impulses after the engine has solved "
+                     "its step, and give newton seconds"));
+  } else if (zeros >= kManyZeros && zeros >= kMostZeros * (others + accepted_count)) {
+    Add(warnings, "IMPULSES_ZERO", zeros,
+        absl::StrCat("the impulse of ", Counted(zeros, "contact"),
+                     " was zero, nearly all that were sent; leave out pairs that do not touch"));
+  }
+  if (const uint64_t count = findings.distant_point_count; count > 0) {
+    v1::Warning& warning = Add(
+        warnings, "POINTS_DISTANT", count,
+        absl::StrFormat("%s up to %.3g m away from the surface of the object, and sound%s at the "
+                        "nearest point; %s",
+                        absl::StrCat(Counted(count, "contact"), count == 1 ? " lies" : " lie"),
+                        findings.largest_distance_m, count == 1 ? "s" : "", WhyDistant(findings)));
+    SetFigure(warning, "largest_distance_m", findings.largest_distance_m);
+  }
+}
 
 void AddWarnings(const IntakeFindings& findings, v1::StreamContactsResponse& report) {
   Warnings& warnings = *report.mutable_warnings();

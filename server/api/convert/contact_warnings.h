@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include "carillon/v1/audio_service.pb.h"
 #include "carillon/v1/contact_service.pb.h"
 #include "server/scene/contact_intake.h"
@@ -13,5 +15,9 @@ void AddWarnings(const IntakeFindings& findings, v1::StreamContactsResponse& rep
 
 /// Does the same for a rendering, in which no contact is late.
 void AddWarnings(const IntakeFindings& findings, v1::RenderSummary& summary);
+
+/// Adds the warnings about impulses and points. `accepted_count` impulses sounded.
+void AddContactWarnings(const IntakeFindings& findings, uint64_t accepted_count,
+                        google::protobuf::RepeatedPtrField<v1::Warning>& warnings);
 
 }  // namespace carillon

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/cpp/error_reason.h"
 #include "server/scene/offline/offline_renderer.h"
 #include "server/scene/scene_registry.h"
 #include "tests/server/scene/recording_target.h"
@@ -220,6 +221,23 @@ TEST(ContactIntake, RejectsAllReportsOfAStepFarAhead) {
   EXPECT_THAT(std::string(intake.last_rejection().message()),
               StartsWith("TIME_TOO_FAR_AHEAD: at 1e+09 s: "));
   EXPECT_EQ(target.events.size(), ended_count);
+}
+
+TEST(ContactIntake, SaysWhenTheFirstOfSeveralRejectionsWas) {
+  Scene scene("a scene", {});
+  RecordingTarget target;
+  ContactIntake intake(scene, target, {.step_s = kStepS});
+  for (const double time_s : {0.25, 0.5, 0.75}) {
+    ASSERT_TRUE(intake.BeginStep(time_s).ok());
+    intake.Strike(SmallImpulse(7));
+    intake.EndStep();
+  }
+  const v1::ErrorInfo error = ToErrorInfo(intake.last_rejection());
+  EXPECT_EQ(error.reason(), "OBJECT_NOT_FOUND");
+  EXPECT_EQ(error.metadata().at("time_s"), "0.75");
+  EXPECT_EQ(error.metadata().at("first_time_s"), "0.25");
+  EXPECT_THAT(error.message(), StartsWith("the first of 3 rejections was at 0.25 s, and the newest "
+                                          "at 0.75 s: "));
 }
 
 /// A scene with two objects, and the events that an intake of it hands on.

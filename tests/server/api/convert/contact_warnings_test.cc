@@ -13,6 +13,7 @@ namespace carillon {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 /// The id, the count and the figures of each warning.
@@ -114,6 +115,23 @@ TEST(ContactWarnings, AMistakeOfTheEngineIsNamedWithItsSizeInPlaceOfAGuess) {
   EXPECT_THAT(WarningsOf(findings),
               ElementsAre(Told{"IMPULSES_ARE_FORCES", 5, {{"object", 3}, {"ratio", 240}}},
                           Told{"FIRST_IMPULSES_ZERO", 4, {{"object", 2}}}));
+}
+
+TEST(ContactWarnings, PointsAreDistantForMillimetresOrForLackOfPoses) {
+  IntakeFindings findings{.distant_point_count = 1, .largest_distance_m = 40};
+  const auto why = [&] {
+    google::protobuf::RepeatedPtrField<v1::Warning> warnings;
+    AddContactWarnings(findings, 1, warnings);
+    EXPECT_EQ(warnings.size(), 1);
+    EXPECT_EQ(warnings[0].id(), "POINTS_DISTANT");
+    return warnings[0].text();
+  };
+  EXPECT_THAT(why(), HasSubstr("quaternions w, x, y, z"));
+  findings.lacks_poses = true;
+  EXPECT_THAT(why(), HasSubstr("no step had a pose"));
+  findings.mistakes[static_cast<size_t>(EngineMistake::kOtherMass)] = {
+      .count = 7, .ratio = 0.00101, .handle = 1};
+  EXPECT_THAT(why(), HasSubstr("millimetres"));
 }
 
 TEST(ContactWarnings, ARenderingHasThoseAboutItsContacts) {
