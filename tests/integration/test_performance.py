@@ -147,6 +147,12 @@ class PerformanceTest(DaemonTest):
         self.assertEqual(reason_of(lambda: sound.step(impacts=impact(9))), "OBJECT_NOT_FOUND")
         sound.step(impacts=impact(1))  # it goes on
         self.assertEqual(reason_of(lambda: sound.step(impacts=impact(1, environments=[1]))), "PERFORMANCE_MALFORMED")
+        for act in (lambda: sound.reset([77]), lambda: sound.reset(-1), lambda: sound.add(self.model, environments=[1]),
+                    lambda: sound.remove(1, [1])):
+            self.assertEqual(reason_of(act), "PERFORMANCE_MALFORMED")
+        sound.step(impacts=impact(1))  # none of these has ended it
+        self.assertEqual(reason_of(lambda: sound.step(time_scale=0.001)), "INVALID_STREAM")
+        self.assertEqual(reason_of(sound.reset), "INVALID_STREAM")  # which ended it
         for settings, reason in ((dict(environments=5000), "INVALID_SETTINGS"), (dict(latency=1), "INVALID_SETTINGS"),
                                  (dict(microphones=[carillon.Ambisonics(order=4)]), "INVALID_SETTINGS"),
                                  (dict(sample_rate_hz=10), "INVALID_SETTINGS")):

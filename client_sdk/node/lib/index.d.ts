@@ -157,7 +157,8 @@ export class Performance {
     poses?: OfEnvironments<NonNullable<StepContent['poses']>>;
     timeScale?: number;
   }): Promise<{ samples: Float32Array; frameCount: number; impacts: PerformedImpacts__Output | null }>;
-  close(): void;
+  /** Ends the performance, and warns as the end of a stream does. Returns the warnings. */
+  close(): Promise<Warning[]>;
 }
 
 /** What a step has. */

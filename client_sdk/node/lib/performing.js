@@ -4,11 +4,15 @@
 const util = require('util');
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
 const { checkedScale, contactColumns, given, poseColumns, present, toHandle, toPose } = require('./contacts');
-const { fromCall, fromInfo } = require('./errors');
+const { message } = require('./contract');
+const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toRadiation } = require('./materials');
 const { samplesOf } = require('./sound');
 const { streamSettings } = require('./traces');
+const { warnOfContacts } = require('./warnings');
 
+// The trailing metadata in which the daemon tells of warnings.
+const SUMMARY_KEY = 'carillon-summary-bin';
 const KINDS = ['omni', 'stereo', 'ears', 'ambisonic'];
 
 /** The indices of environments for a message, where none means all. */
@@ -57,6 +61,7 @@ class Performance {
   async begin() {
     this.call = this.client.stub('AudioService').Perform();
     this.client.openCalls.add(this.call);
+    this.ended = new Promise((resolve) => this.call.once('status', resolve));
     this.answers = this.call[Symbol.asyncIterator]();
     const { begun } = await this.ask({ settings: this.settings });
     this.sampleRateHz = begun.sampleRateHz;
@@ -108,7 +113,13 @@ class Performance {
    * objects and microphones are where they were added.
    */
   reset(environments) {
-    this.call.write({ reset: { environments: indices(environments) } });
+    const listed = indices(environments);
+    const unknown = listed.find((index) => !(index >= 0 && index < this.environmentCount));
+    if (unknown !== undefined) {
+      throw new CarillonError('PERFORMANCE_MALFORMED',
+        `environment ${unknown} is unknown; the performance has ${this.environmentCount}, counted from 0`);
+    }
+    this.call.write({ reset: { environments: listed } });
   }
 
   /**
@@ -141,11 +152,16 @@ class Performance {
     return { samples: samplesOf(pieces), frameCount: answer.frameCount, impacts: answer.impacts };
   }
 
-  /** Ends the performance. */
-  close() {
+  /** Ends the performance, and warns of what is probably wrong with its contacts. Returns the warnings. */
+  async close() {
     this.client.openCalls.delete(this.call);
-    this.call.on('error', () => {}); // that it was cancelled
-    this.call.cancel();
+    this.call.on('error', () => {}); // which a step has thrown
+    this.call.end();
+    const { metadata } = await this.ended;
+    const warnings = metadata.get(SUMMARY_KEY)
+      .flatMap((bytes) => message('RenderSummary').deserialize(bytes).warnings);
+    warnOfContacts(warnings);
+    return warnings;
   }
 
   [util.inspect.custom]() {

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <span>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "proto/cpp/status_macros.h"
 #include "server/api/call/exchange_call.h"
 #include "server/api/call/status_conversion.h"
+#include "server/api/convert/contact_warnings.h"
 #include "server/api/convert/object_conversion.h"
 #include "server/api/convert/perform_conversion.h"
 #include "server/api/convert/perform_rows.h"
@@ -28,6 +31,8 @@ namespace {
 constexpr size_t kMostSampleBytes = size_t{2} << 20U;
 /// Objects for which each environment has room, beside those of the settings.
 constexpr size_t kMoreObjects = 64;
+/// The trailing metadata that has the warnings, as a RenderSummary.
+constexpr char kSummaryKey[] = "carillon-summary-bin";
 
 absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED", message);
@@ -112,8 +117,32 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   absl::Status Reset(const v1::PerformReset& reset) {
-    return ForEach(reset.environments(),
-                   [](Environment& environment) { return environment.Reset(); });
+    return ForEach(reset.environments(), [this](Environment& environment) {
+      NoteWarnings(environment);
+      return environment.Reset();
+    });
+  }
+
+  /// Keeps the warnings about the contacts since the last reset. Of several with the same id the
+  /// largest one stays.
+  void NoteWarnings(const Environment& environment) {
+    google::protobuf::RepeatedPtrField<v1::Warning> warnings;
+    AddContactWarnings(environment.findings(), environment.accepted_count(), warnings);
+    for (const v1::Warning& warning : warnings) {
+      v1::Warning& kept = warnings_[warning.id()];
+      if (warning.count() >= kept.count()) kept = warning;
+    }
+  }
+
+  /// Tells the warnings with the end of the call.
+  void SendWarnings() {
+    for (size_t i = 0; performance_ != nullptr && i < performance_->environment_count(); ++i) {
+      NoteWarnings(performance_->environment(i));
+    }
+    if (warnings_.empty()) return;
+    v1::RenderSummary summary;
+    for (const auto& [id, warning] : warnings_) *summary.add_warnings() = warning;
+    context().AddTrailingMetadata(kSummaryKey, summary.SerializeAsString());
   }
 
   absl::Status Step(const v1::PerformStep& step) {
@@ -143,7 +172,9 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
     } else if (answers_) {
       FillSamples(*response.mutable_samples());
     } else {
-      return ended_ ? Supply::kEnd : Supply::kLater;
+      if (!ended_) return Supply::kLater;
+      SendWarnings();
+      return Supply::kEnd;
     }
     return Supply::kMessage;
   }
@@ -201,8 +232,9 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   bool begins_ = false;   // whether PerformanceBegun is to be sent
   bool answers_ = false;  // whether samples are to be sent
   bool ended_ = false;
-  std::span<const float> samples_;  // of the last step
-  size_t sent_count_ = 0;           // environments whose samples were sent
+  std::map<std::string, v1::Warning> warnings_;  // by id
+  std::span<const float> samples_;               // of the last step
+  size_t sent_count_ = 0;                        // environments whose samples were sent
 };
 
 }  // namespace

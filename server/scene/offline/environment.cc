@@ -57,6 +57,7 @@ absl::StatusOr<std::unique_ptr<ForwardRenderer>> Environment::MakeRenderer(
        .mapping = {.delay_s =
                        static_cast<double>(timing_.latency_frames) / settings_.sample_rate_hz},
        .tells_blows = settings_.tells_impacts && heard_.empty(),
+       .balances = balances_ && heard_.empty(),
        .thread_count = 1,
        .size = {.block_frame_count = timing_.block_frame_count,
                 .most_objects = settings_.most_objects,

@@ -44,9 +44,15 @@ StepTiming TimingOf(const EnvironmentSettings& settings);
 /// microphone hears its own rendering. Only one thread at a time may use an object.
 class Environment {
  public:
-  /// `bodies` and `transfers` must outlive this. Reset must be called first.
-  Environment(const EnvironmentSettings& settings, BodyCache& bodies, TransferStore* transfers)
-      : settings_(settings), timing_(TimingOf(settings)), bodies_(bodies), transfers_(transfers) {}
+  /// `bodies` and `transfers` must outlive this. `balances` is as of IntakeSettings. Reset must be
+  /// called first.
+  Environment(const EnvironmentSettings& settings, BodyCache& bodies, TransferStore* transfers,
+              bool balances)
+      : settings_(settings),
+        timing_(TimingOf(settings)),
+        bodies_(bodies),
+        transfers_(transfers),
+        balances_(balances) {}
 
   /// Ends all sound at once, and begins anew with the objects as they were added. Errors: those of
   /// ForwardRenderer::Make.
@@ -76,6 +82,10 @@ class Environment {
   uint64_t rejected_count() const;
   absl::Status last_rejection() const { return first().intake().last_rejection(); }
 
+  /// What is unusual about the contacts since the last reset, and the number of impulses taken.
+  IntakeFindings findings() const { return first().intake().findings(); }
+  uint64_t accepted_count() const { return first().statistics().accepted_count; }
+
  private:
   struct AddedObject {
     std::shared_ptr<const ModalModel> model;
@@ -97,6 +107,7 @@ class Environment {
   const StepTiming timing_;
   BodyCache& bodies_;
   TransferStore* const transfers_;
+  const bool balances_;
   std::map<uint32_t, AddedObject> objects_;
   std::vector<Heard> heard_;      // of each microphone
   uint64_t step_count_ = 0;       // since the last reset, without pauses

@@ -51,7 +51,8 @@ IntakeSettings IntakeSettingsOf(const OfflineSettings& settings, std::vector<Blo
           .mapping = settings.mapping,
           .most_ahead_s = ForwardRenderer::kMaxDurationS,
           .reading = settings.reading,
-          .blows = settings.tells_blows ? &blows : nullptr};
+          .blows = settings.tells_blows ? &blows : nullptr,
+          .balances = settings.balances};
 }
 
 bool IsMove(const MixerEvent& event) {

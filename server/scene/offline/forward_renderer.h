@@ -30,7 +30,8 @@ struct OfflineSettings {
   uint32_t sample_rate_hz = 48000;
   uint32_t channel_count = 1;  ///< 1 or 2; in ambisonics up to 16
   /// Length of the sound after the last contact. If it is zero, the sound ends when it stays below
-  /// -80 dB of full scale, and after 60 s at the latest. Only OfflineRenderer uses it.
+  /// -80 dB of full scale and 60 dB below its peak, and after 60 s at the latest. Only
+  /// OfflineRenderer uses it.
   double tail_s = 0;
   double gain = 1;                      ///< gain of the whole sound, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
@@ -44,6 +45,7 @@ struct OfflineSettings {
   /// The stagger of the bus through which the trace was heard live (Mixer::Stagger).
   size_t stagger = 0;
   bool tells_blows = false;  ///< whether TakeBlows has anything to give
+  bool balances = true;      ///< as of IntakeSettings
   /// The sound is bit for bit the same for any number of threads.
   size_t thread_count = std::max(std::thread::hardware_concurrency(), 1U);
   /// Sizes for which memory is taken.

@@ -57,7 +57,9 @@ absl::StatusOr<std::unique_ptr<Performance>> Performance::Make(const Environment
   thread_count = std::min(thread_count, environment_count);
   std::unique_ptr<Performance> performance(new Performance(settings, thread_count));
   for (size_t i = 0; i < environment_count; ++i) {
-    auto environment = std::make_unique<Environment>(performance->settings_, bodies, transfers);
+    // All environments have the same engine, whose mistakes the first one shows.
+    auto environment =
+        std::make_unique<Environment>(performance->settings_, bodies, transfers, i == 0);
     RETURN_IF_ERROR(environment->Reset());
     performance->environments_.push_back(std::move(environment));
   }

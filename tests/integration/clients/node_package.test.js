@@ -317,8 +317,11 @@ test('a performance gives the samples of each step, the same again after a reset
   for (const timeScale of [1, 0.25, 0, 4]) counts.push((await slow.step({ timeScale })).frameCount);
   assert.deepEqual(counts, [960, 3840, 960, 240]);
   await assert.rejects(slow.step({ timeScale: -1 }), TypeError);
-  slow.close();
-  sound.close();
+  assert.throws(() => slow.reset([1]), { reason: 'PERFORMANCE_MALFORMED' });
+  const far = { ...blow, objects: slow.add(model), points: [[9, 9, 9]], environments: [0] };
+  await slow.step({ impacts: far });
+  assert.deepEqual((await slow.close()).map(({ id, count }) => [id, count]), [['POINTS_DISTANT', 1]]);
+  assert.deepEqual(await sound.close(), []); // which an error has ended
 });
 
 test('a trace is written and read, and a damaged one is refused', async () => {

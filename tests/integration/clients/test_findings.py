@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The mistakes of an engine that the motion of its bodies shows: the daemon names them, every client tells the same."""
 
+import asyncio
 import ctypes
 import json
 import subprocess
+import types
 import unittest
 import warnings
 
@@ -115,6 +117,32 @@ class FindingsTest(PackageTest):
             rendered = {one.id: dict(one.figures)
                         for one in self.c.render(self.write("heavy"), tail_s=0.1).summary.warnings}
         self.assertEqual(live["MASSES_DIFFER"], rendered["MASSES_DIFFER"])
+
+    def test_a_performance_tells_at_its_end_what_the_rendering_tells(self):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            with self.c.perform(step=1 / RATE_HZ, environments=2) as sound:
+                bar = sound.add(self.model, gain=0.01)
+                self.send(types.SimpleNamespace(step=lambda _, **content: sound.step(**content)), bar, "heavy")
+                sound.reset()
+            rendered = {one.id: dict(one.figures)
+                        for one in self.c.render(self.write("heavy"), tail_s=0.1).summary.warnings}
+        kept, = sound.warnings
+        self.assertEqual(kept.figures["object"], rendered["MASSES_DIFFER"]["object"])
+        self.assertAlmostEqual(kept.figures["ratio"], rendered["MASSES_DIFFER"]["ratio"], places=6)
+        self.assertEqual([one.message.id for one in told], ["MASSES_DIFFER"] * 2)
+
+    def test_a_performance_of_asyncio_tells_it_too(self):
+        async def perform():
+            async with carillon.aio.connect(self.c.server) as c, c.perform(step=1 / RATE_HZ) as sound:
+                bar = sound.add(self.model, gain=0.01)
+                for _ in range(3):
+                    await sound.step(contacts=carillon.Contacts(bar, [(9, 9, 9)], [(0, 0, 1e-3)], partners=1))
+            return sound.warnings
+
+        with self.assertWarns(carillon.ContactWarning) as told:
+            kept, = asyncio.run(perform())
+        self.assertEqual((told.warning.id, kept.id, kept.count), ("POINTS_DISTANT", "POINTS_DISTANT", 3))
 
     def c_library(self):
         prefix = self.folder / "prefix"

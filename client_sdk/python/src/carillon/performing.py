@@ -18,9 +18,11 @@ from carillon.columns import append
 from carillon.connection import Connection
 from carillon.contacts import Array, ContactForces, Contacts, Impacts, PoseLike, Poses, checked_scale
 from carillon.faces import AwaitedBlock, Block, BlockingBlock, call
-from carillon.v1 import contact_trace_pb2, performance_pb2
+from carillon.v1 import audio_service_pb2, contact_trace_pb2, performance_pb2, warning_pb2
 
 Environments = Union[None, int, Iterable[int]]
+# The trailing metadata in which the daemon tells of warnings.
+SUMMARY_KEY = "carillon-summary-bin"
 ENVIRONMENT = "the index of an environment, a whole number from 0"
 
 
@@ -94,6 +96,12 @@ class HeardImpacts:
     def __len__(self) -> int:
         return len(self.objects)
 
+    def __getitem__(self, rows: Any) -> HeardImpacts:
+        """The impacts of some rows, which a number, a slice or a mask names."""
+        if isinstance(rows, (int, numpy.integer)):
+            rows = [range(len(self))[rows]]
+        return HeardImpacts(*(column[rows] for column in vars(self).values()))
+
 
 def _heard(message: performance_pb2.PerformedImpacts) -> HeardImpacts:
     return HeardImpacts(
@@ -120,7 +128,8 @@ def settings_of(step: float, environments: int, microphones: Iterable[Microphone
 class PerformanceCalls(Block):
     """Environments whose sound comes in step with their simulation. The block begins them, and its end ends them.
     `channel_count` is that of all microphones together, and `latency` is the constant time from a contact to its sound,
-    in seconds; both are known within the block. `step` counts time: step k ends at k times its duration."""
+    in seconds; both are known within the block. `step` counts time: step k ends at k times its duration. At the end of
+    the block a ContactWarning tells of each of `warnings`, as at the end of a stream."""
 
     def __init__(self, client: Connection, settings: performance_pb2.PerformSettings):
         self._client = client
@@ -129,6 +138,7 @@ class PerformanceCalls(Block):
         self._handle = 0
         self._rejected_count = 0
         self._call: Any = None
+        self.warnings: list[warning_pb2.Warning] = []
         self.environment_count: int = max(settings.environment_count, 1)
         self.sample_rate_hz = 0
         self.channel_count = 0
@@ -145,13 +155,14 @@ class PerformanceCalls(Block):
             handle: Optional[int] = None, radiation: Optional[materials.Radiation] = None) -> int:
         """Adds an object to the environments, by default to all, before the contacts of the next step. Returns its
         handle, which is the same in each of them."""
-        self._handle = handle or self._handle + 1
+        indices = self._indices(environments)
         name, message = materials.named(model, material)
+        self._handle = handle or self._handle + 1
         self._next.added_objects.add(
             object=checks.message(contact_trace_pb2.ContactTraceObject, "add", dict(
                 handle=self._handle, modal_model=name, material=message, size=size, gain=gain,
                 pose=None if pose is None else contacts.to_pose(pose), radiation=materials.to_radiation(radiation))),
-            environments=self._indices(environments))
+            environments=indices)
         return self._handle
 
     def remove(self, item: Any, environments: Environments = None) -> None:
@@ -171,11 +182,19 @@ class PerformanceCalls(Block):
             turn = to.orientation if to.HasField("orientation") else None
             poses.orientation.extend((turn.w, turn.x, turn.y, turn.z) if turn else (1, 0, 0, 0))
 
+    def _warn(self, trailing_metadata: Optional[Iterable[tuple[str, Any]]]) -> None:
+        """Warns of what the daemon tells with the end of the call."""
+        for key, value in trailing_metadata or ():
+            if key == SUMMARY_KEY:
+                self.warnings = list(audio_service_pb2.RenderSummary.FromString(value).warnings)
+        errors.warn_of_contacts(self.warnings)
+
     @call
     async def reset(self, environments: Environments = None) -> None:
         """Ends the sound of environments, by default of all, at once, and lets them begin anew: their time is zero, and
         their objects and microphones are where they were added. The sound is then that of new environments, bit for
-        bit."""
+        bit. Raises CarillonError (PERFORMANCE_MALFORMED) for an environment that is not there, which changes
+        nothing."""
         await self._send(performance_pb2.PerformRequest(
             reset=performance_pb2.PerformReset(environments=self._indices(environments))))
 
@@ -190,10 +209,12 @@ class PerformanceCalls(Block):
         [environment, channel, frame] that must not be written to, and the impacts if the performance tells them. Raises
         CarillonError if a contact is rejected; the step was performed without it."""
         scale = checked_scale(time_scale)
-        step, self._next = self._next, performance_pb2.PerformStep()
-        if scale is not None:
-            step.time_scale = scale
+        step = performance_pb2.PerformStep(time_scale=scale)
         _fill(step, contacts, impacts, forces, poses)
+        for rows in (*step.contacts, step.poses):
+            self._check(max(rows.environment, default=0))
+        step.MergeFrom(self._next)
+        self._next = performance_pb2.PerformStep()
         message = (await self._ask(performance_pb2.PerformRequest(step=step))).samples
         pieces = [message]
         while not message.is_last:
@@ -216,7 +237,16 @@ class PerformanceCalls(Block):
         given = [environments] if isinstance(environments, (int, numpy.integer)) else list(environments)
         if not given:
             raise ValueError("environments is empty; leave it out to mean all of them")
-        return [operator.index(item) for item in given]
+        indices = [operator.index(item) for item in given]
+        for index in indices:
+            self._check(index)
+        return indices
+
+    def _check(self, index: int) -> None:
+        """Refuses an environment that is not there, by which the daemon would end the performance."""
+        if not 0 <= index < self.environment_count:
+            raise errors.CarillonError("PERFORMANCE_MALFORMED", f"environment {index} is unknown; the performance has "
+                                       f"{self.environment_count}, counted from 0")
 
     async def _open(self) -> None:
         raise NotImplementedError
@@ -264,6 +294,8 @@ class Performance(BlockingBlock, PerformanceCalls):
         self._call = self._client.audio_stub.Perform(requests)
 
     async def _send(self, request: performance_pb2.PerformRequest) -> None:
+        if not self._call.is_active():
+            await self._receive()  # raises the error that has ended the call
         self._requests.put(request)
 
     async def _receive(self) -> performance_pb2.PerformResponse:
@@ -278,6 +310,7 @@ class Performance(BlockingBlock, PerformanceCalls):
         with contextlib.suppress(grpc.RpcError):  # a step has raised the error that ended the call
             for _ in self._call:
                 pass
+            self._warn(self._call.trailing_metadata())
 
 
 class AsyncPerformance(AwaitedBlock, PerformanceCalls):
@@ -305,6 +338,7 @@ class AsyncPerformance(AwaitedBlock, PerformanceCalls):
         with contextlib.suppress(grpc.RpcError):
             await self._call.done_writing()
             await self._call.code()
+            self._warn(await self._call.trailing_metadata())
 
 
 AnyPerformance = TypeVar("AnyPerformance", Performance, AsyncPerformance)
