@@ -22,6 +22,11 @@ namespace {
 
 constexpr uint32_t kFormatVersion = 1;
 constexpr uint64_t kMostFirstFrame = uint64_t{1} << 48;
+/// Steps by whose intervals the unit of time is judged: StepIntervals wants ten intervals.
+constexpr uint64_t kJudgedSteps = 12;
+constexpr double kMillisecondsInSecond = 1000;
+/// Times that are rounded to milliseconds make the mean of few intervals uneven.
+constexpr double kUnitTolerance = 50;
 
 absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_MALFORMED", message);
@@ -142,7 +147,24 @@ absl::Status TraceReader::CheckTime(double time_s) const {
 absl::Status TraceReader::TakeStep(const v1::ContactStep& step) {
   RETURN_IF_ERROR(CheckTime(step.time_s()));
   time_s_ = step.time_s();
-  return ReadStep(step, renderer_->intake());
+  RETURN_IF_ERROR(ReadStep(step, renderer_->intake()));
+  return renderer_->intake().step_count() == kJudgedSteps ? CheckUnit(step) : absl::OkStatus();
+}
+
+/// Refuses times in milliseconds, which would make hours of silence. A trace of strikes alone may
+/// have steps as far apart.
+absl::Status TraceReader::CheckUnit(const v1::ContactStep& step) const {
+  const IntakeFindings findings = renderer_->intake().findings();
+  const bool simulates =
+      step.has_poses() || findings.engine.blow_count + findings.engine.load_count > 0;
+  const double steps = findings.regular_gap_s / settings_->step_s;
+  if (!simulates || std::abs(steps - kMillisecondsInSecond) > kUnitTolerance) {
+    return absl::OkStatus();
+  }
+  return Malformed(absl::StrCat(
+      "the first ", kJudgedSteps, " steps are ", ShortestDecimal(findings.regular_gap_s),
+      " s apart, 1000 times the header's step_s of ", ShortestDecimal(settings_->step_s),
+      ": their times are probably in milliseconds; give seconds"));
 }
 
 }  // namespace carillon

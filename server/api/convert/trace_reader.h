@@ -44,6 +44,7 @@ class TraceReader {
   absl::Status TakeObject(const v1::ContactTraceObject& message);
   absl::Status TakeStep(const v1::ContactStep& step);
   absl::Status CheckTime(double time_s) const;
+  absl::Status CheckUnit(const v1::ContactStep& step) const;
 
   ModeDatabase& database_;
   HeadStore& heads_;

@@ -90,6 +90,49 @@ class CallsTest(DaemonTest):
         self.assertAlmostEqual(blow.time_s, 0.25)
         self.assertAlmostEqual(blow.duration_s, DURATION_S)
 
+    def test_a_strike_rings_until_it_is_60_db_below_its_peak_and_fades_out(self):
+        for factor in (1, 0.01):
+            heard = abs(self.model.render_strike(POINT, numpy.multiply(IMPULSE, factor)).samples[:, 0])
+            loud = numpy.flatnonzero(heard > heard.max() / 1000)
+            self.assertAlmostEqual((len(heard) - loud[-1]) / 48000, 0.26, delta=0.01)
+            self.assertLessEqual(heard[-1], 1e-4 * heard[-480 * 3:-480].max())
+
+    def test_times_in_milliseconds_are_refused_and_rare_strikes_are_not(self):
+        def trace(step_s, **content):
+            made = carillon.Trace(step_s)
+            bar = made.add(self.model)
+            for i in range(13):
+                made.step(1000 * i * step_s, **{name: kind(bar) for name, kind in content.items()})
+            return made
+
+        def impact(bar):
+            return carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S)
+
+        moving = trace(1 / 240, impacts=impact, poses=lambda bar: carillon.Poses(bar, [(0, 0, 0)]))
+        with self.assertRaises(carillon.CarillonError) as raised:
+            self.c.render(moving)
+        self.assertEqual(raised.exception.reason, "TRACE_MALFORMED")
+        self.assertIn("milliseconds", raised.exception.message)
+        with self.assertWarns(carillon.ContactWarning):  # STEP_TOO_SHORT
+            self.assertEqual(self.c.render(trace(1 / 1000, impacts=impact), tail_s=0.1).samples.size, 12.1 * 48000)
+
+    def test_a_rendering_ends_at_its_timeout_and_by_an_interrupt(self):
+        trace = carillon.Trace(1 / 60)
+        bar = trace.add(self.model)
+        for time_s in (0, 80000):
+            trace.step(time_s, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
+        with self.assertRaises(carillon.CarillonError) as raised:
+            self.c.render(trace, timeout=0.3)
+        self.assertEqual(raised.exception.reason, "DEADLINE_EXCEEDED")
+        file = self.daemon.folder / "long.contacts"
+        trace.write(file)
+        script = ("import carillon, os, signal, sys, threading\n"
+                  "threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+                  "carillon.connect(sys.argv[1]).render(sys.argv[2])\n")
+        done = subprocess.run([sys.executable, "-c", script, self.daemon.server, file], stderr=subprocess.PIPE,
+                              text=True, timeout=60)
+        self.assertTrue(done.stderr.rstrip().endswith("KeyboardInterrupt"), done.stderr)
+
     def test_soft_and_limited_sounds_are_normalised_alike(self):
         sounds = []
         for factor in (1, 1e-5, 1e4):

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Optional
 
 import numpy
 
@@ -18,20 +19,33 @@ from carillon.v1 import audio_service_pb2
 LEAST_FULL_SCALE_PA = 0.00002
 
 
-async def render(connection: Connection, trace: Trace, settings: dict[str, Any], normalize: bool = False) -> Sound:
+async def render(connection: Connection, trace: Trace, settings: dict[str, Any], normalize: bool = False,
+                 timeout: Optional[float] = None) -> Sound:
     """Renders a trace; see Client.render."""
-    sound = await connection.in_turn(lambda: _render(connection, trace, settings))
+    try:
+        return await _rendered(connection, trace, settings, normalize, timeout)
+    except errors.CarillonError as error:
+        if error.reason != "DEADLINE_EXCEEDED":
+            raise
+        raise errors.CarillonError(error.reason, f"the rendering has not ended after {timeout:.3g} s; wait longer, or "
+                                   "look whether the times of the trace are seconds") from error
+
+
+async def _rendered(connection: Connection, trace: Trace, settings: dict[str, Any], normalize: bool,
+                    timeout: Optional[float]) -> Sound:
+    end_s = None if timeout is None else time.monotonic() + timeout
+    sound = await connection.in_turn(lambda: _render(connection, trace, settings, end_s))
     if not normalize:
         return sound
     summary = sound.summary
     if (summary and "full_scale_pa" not in settings
             and (0 < summary.peak < 0.01 or summary.limited_frame_count > 0)):
         louder = {**settings, "full_scale_pa": max(1.5 * summary.peak_pa, LEAST_FULL_SCALE_PA)}
-        sound = await connection.in_turn(lambda: _render(connection, trace, louder))
+        sound = await connection.in_turn(lambda: _render(connection, trace, louder, end_s))
     return sound.normalized()
 
 
-async def _render(connection: Connection, trace: Trace, given: dict[str, Any]) -> Sound:
+async def _render(connection: Connection, trace: Trace, given: dict[str, Any], end_s: Optional[float]) -> Sound:
     request = audio_service_pb2.RenderRequest
     settings = checks.message(audio_service_pb2.RenderSettings, "render", given)
 
@@ -41,7 +55,8 @@ async def _render(connection: Connection, trace: Trace, given: dict[str, Any]) -
 
     blocks, rate_hz, channels, summary = [], 0, 1, audio_service_pb2.RenderSummary()
     blows: list[audio_service_pb2.Blow] = []
-    async for answer in connection.answers(connection.audio_stub.Render, requests()):
+    left_s = None if end_s is None else max(0, end_s - time.monotonic())
+    async for answer in connection.answers(connection.audio_stub.Render, requests(), left_s):
         kind = answer.WhichOneof("response")
         if kind == "format":
             rate_hz, channels = answer.format.sample_rate_hz, answer.format.channel_count
