@@ -86,6 +86,7 @@ class RefusalsTest(MessagesTest):
         self.refused("handle of add is -1; it must be a whole number, zero or more", scene.add, "modalModels/1",
                      handle=-1)
         self.refused("material is of type int", scene.add, "modalModels/1", 7)
+        self.refused("give figures by carillon.material(young_pa=...", scene.add, "modalModels/1", {"young": 2e11})
 
     def test_a_gain_that_is_no_number_is_refused_as_linear(self):
         scene = carillon.Scene(self.c, "scenes/1")

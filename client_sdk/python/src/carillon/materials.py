@@ -47,6 +47,9 @@ def to_message(given: Material) -> material_pb2.Material:
     if isinstance(given, material_pb2.Material):
         return given
     if isinstance(given, Mapping):
+        if any(isinstance(value, (int, float)) for value in given.values()):
+            raise TypeError(f"material is {dict(given)!r}, and a dictionary names the material of each region of the "
+                            "mesh; give figures by carillon.material(young_pa=..., density_kg_per_m3=..., ...)")
         return material_pb2.Material(regions=[
             material_pb2.RegionMaterial(region=region, material=to_message(of_region))
             for region, of_region in given.items()])
