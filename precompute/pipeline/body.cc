@@ -15,6 +15,7 @@
 #include "precompute/pipeline/body_regions.h"
 #include "precompute/pipeline/model_checks.h"
 #include "precompute/pipeline/worker_request.h"
+#include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
@@ -125,12 +126,10 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
   observer.OnProgress(v1::PHASE_READ, 0);
   const v1::DecompositionSettings& settings = request.settings();
   ASSIGN_OR_RETURN(NamedMesh read,
-                   ParseMesh(bytes, request.mesh_format(), settings.metres_per_unit()));
+                   ParseMesh(bytes, request.mesh_format(), MetresPerUnit(settings)));
   const double extent_m = ExtentOf(read.mesh);
   observer.OnExtent(UseOf(request).size * extent_m);
-  const absl::Status unit = CheckUnit(extent_m, settings.metres_per_unit(), UseOf(request));
-  if (request.max_frequency_hz() > 0) RETURN_IF_ERROR(unit);
-  if (!unit.ok()) read.warnings.push_back(ToErrorInfo(unit).message());
+  if (settings.metres_per_unit() == 0) RETURN_IF_ERROR(CheckUnit(extent_m, UseOf(request)));
   ASSIGN_OR_RETURN(RegionMaterials regions, MaterialsOf(request, read.names));
   const auto number = [&](std::vector<int32_t>& numbers) {
     if (settings.regions().empty()) return numbers.clear();

@@ -13,6 +13,7 @@
 #include "precompute/mesh/surface/surface_shells.h"
 #include "precompute/modes/audible_modes.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/limits.h"
 
 namespace carillon::precompute {
 namespace {
@@ -24,20 +25,18 @@ constexpr double kFirstOfCompactHz = 1;
 
 }  // namespace
 
-absl::Status CheckUnit(double extent_m, double metres_per_unit, const IntendedUse& use) {
-  constexpr double kLongBodyM = 50, kMostWavelengths = 100;
+absl::Status CheckUnit(double extent_m, const IntendedUse& use) {
+  constexpr double kMostWavelengths = 100;
   const double speed_m_per_s = std::sqrt(use.young_pa / use.density_kg_per_m3);
   const double highest_hz = kMostWavelengths * speed_m_per_s / extent_m;
-  if (metres_per_unit != 1 || use.size != 1 || extent_m <= kLongBodyM ||
-      use.high_hz <= highest_hz) {
+  if (use.size != 1 || extent_m <= kLikelyExtentM || use.high_hz <= highest_hz) {
     return absl::OkStatus();
   }
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MESH_UNIT_UNCLEAR",
-      absl::StrFormat("the body is %.4g m long, because the file's lengths are read as metres: if "
-                      "they are not, give the unit of the file (--unit mm); if they are, a band up "
-                      "to at most %.3g Hz suits it, or none (--band)",
-                      extent_m, highest_hz));
+      absl::StrFormat("the body is %.4g m long if the lengths of its file are metres: give their "
+                      "unit, such as --unit mm, or --unit m if they are metres indeed",
+                      extent_m));
 }
 
 bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use) {

@@ -8,11 +8,10 @@
 
 namespace carillon::precompute {
 
-/// Refuses a body that is so long that its unit was probably forgotten: longer than 50 m and than a
-/// hundred wavelengths of the band's upper end, in a file whose lengths are read as metres. A
-/// caller who left the band open waits for a minute at most, and may take the refusal's text for a
-/// warning; with a band hours might be spent. Errors: MESH_UNIT_UNCLEAR.
-absl::Status CheckUnit(double extent_m, double metres_per_unit, const IntendedUse& use);
+/// Refuses a body, in a file whose unit nobody has stated, that is so long that the unit was
+/// probably forgotten: longer than 20 m and than a hundred wavelengths of the band's upper end.
+/// Errors: MESH_UNIT_UNCLEAR.
+absl::Status CheckUnit(double extent_m, const IntendedUse& use);
 
 /// Returns whether a body may be too small to have a mode in the band, and is so compact that its
 /// default mesh takes long.

@@ -41,6 +41,9 @@ std::string RoundedWhole(double value) {
   return absl::StrFormat("%.0f", unit * std::round(value / unit));
 }
 
+/// A mode lies surely in a band, whatever mesh it is computed on, if it is by this factor inside.
+constexpr double kInside = 1.002;
+
 /// The lower end of the band that an option with the upper end alone means.
 constexpr double kUsualLowestHz = 20;
 
@@ -53,30 +56,34 @@ std::string RoundedDown(double value) {
   return absl::StrFormat("%.0f", unit * std::floor(value / unit));
 }
 
+/// Returns a band's upper end with two digits, at least as high as given.
+std::string RoundedUp(double value) {
+  const double unit = std::pow(10, std::max(0.0, std::floor(std::log10(value)) - 1));
+  return value > 0 ? absl::StrFormat("%.0f", unit * std::ceil(value / unit)) : "";
+}
+
 double SizeOf(const worker::v1::WorkerRequest& request) {
   return request.size() > 0 ? request.size() : 1;
 }
 
 /// A wall of this part of the body's diagonal is thin, and thick enough to be meshed.
 constexpr double kWallPart = 0.02;
-/// A body whose first mode lies here, or lower in the band, has most of its sound in the band.
-constexpr double kAudibleHz = 1000;
 constexpr double kCoarseNodeCount = 5000;
 /// Processor time in seconds that a first budget allows.
 constexpr double kFirstBudget = 120;
 
-/// Returns the size with which the first mode lies in the band, or an empty string if rounding it
-/// moves the mode out of a narrow band.
+/// Returns the nearest size, rounded away, with which the first mode lies in the band, or an empty
+/// string if rounding it moves the mode out of a narrow band.
 std::string SizeInBand(const Refused& refused) {
   const double low_hz = refused.request.min_frequency_hz(), high_hz = TopOfBandHz(refused.request);
-  const double usual_hz = std::min(kAudibleHz, high_hz / 2);
-  const double wanted_hz = usual_hz > low_hz ? usual_hz : std::sqrt(low_hz * high_hz);
+  const bool is_low = refused.Figure("first_mode_hz") <= low_hz;
   const double at_size_one = SizeOf(refused.request) * refused.Figure("first_mode_hz");
   for (const int digits : {2, 4}) {
-    std::string text = absl::StrFormat("%.*g", digits, at_size_one / wanted_hz);
-    double size = 0;
-    if (!absl::SimpleAtod(text, &size) || !(size > 0)) return "";
-    if (at_size_one / size > low_hz && at_size_one / size < high_hz) return text;
+    const double limit = at_size_one / (is_low ? kInside * low_hz : high_hz / kInside);
+    const double unit = std::pow(10, std::floor(std::log10(limit)) + 1 - digits);
+    const double size = unit * (is_low ? std::floor(limit / unit) : std::ceil(limit / unit));
+    const double first_hz = at_size_one / size;
+    if (first_hz > low_hz && first_hz < high_hz) return absl::StrFormat("%.*g", digits, size);
   }
   return "";
 }
@@ -170,8 +177,8 @@ constexpr Known kSize{"size", "--size",
                       "makes the body so large that its first mode lies in the band", SizeInBand,
                       [](const Refused& r) { return SizeInBand(r).empty(); }};
 constexpr Known kHigherBand{
-    "max_frequency_hz", "--band", "looks for modes up to four times the first",
-    [](const Refused& refused) { return RoundedWhole(4 * refused.Figure("first_mode_hz")); },
+    "max_frequency_hz", "--band", "reaches the first mode; a higher end finds more modes",
+    [](const Refused& refused) { return RoundedUp(1.05 * refused.Figure("first_mode_hz")); },
     [](const Refused& r) {
       const double first_hz = r.Figure("first_mode_hz");
       return first_hz < std::max(r.request.min_frequency_hz(), kUsualLowestHz);
@@ -186,6 +193,9 @@ constexpr Known kMetres{"settings.metres_per_unit", "--unit", "reads the file's 
 constexpr Known kMillimetres{"settings.metres_per_unit", "--unit",
                              "reads the file's lengths as millimetres",
                              [](const Refused&) -> std::string { return "0.001"; }, Never};
+constexpr Known kMetresIndeed{"settings.metres_per_unit", "--unit",
+                              "computes the body as long as it is in metres",
+                              [](const Refused&) -> std::string { return "1"; }, Never};
 
 std::vector<Known> RemediesOf(const std::string& reason) {
   if (reason == "MESH_NOT_CLOSED") return {kRepair, kWall};
@@ -195,7 +205,7 @@ std::vector<Known> RemediesOf(const std::string& reason) {
     if (reason == faulty) return {kRepair};
   }
   if (reason == "MESH_REPAIR_FAILED") return {kWall};
-  if (reason == "MESH_UNIT_UNCLEAR") return {kMillimetres};
+  if (reason == "MESH_UNIT_UNCLEAR") return {kMillimetres, kMetresIndeed};
   if (reason == "MESH_WALL_IMPOSSIBLE") return {kThinnerWall, kSolid};
   if (reason == "MESH_TETRAHEDRALIZATION_FAILED") return {kNodes, kRepair};
   if (reason == "TOO_MANY_MODES") return {kOpenBand, kKeep, kCountedBand};

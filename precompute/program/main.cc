@@ -32,6 +32,7 @@
 #include "precompute/program/sha256.h"
 #include "precompute/program/worker_events.h"
 #include "precompute/sparse/openblas.h"
+#include "proto/cpp/decomposition_settings.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/mesh_file.h"
 #include "proto/cpp/status_macros.h"
@@ -50,6 +51,7 @@ absl::StatusOr<StoredModel> DecomposeAndWrite(const CommandLine& asked,
                                               ProgressReporter& reporter) {
   ASSIGN_OR_RETURN(std::string mesh, ReadMeshFile(asked.input, asked.request.mesh_format()));
   ModelOrigin origin{.mesh_digest = Sha256Hex(mesh), .settings = asked.request.settings()};
+  origin.settings.set_metres_per_unit(MetresPerUnit(origin.settings));
   ASSIGN_OR_RETURN(ModalModel model, Decompose(std::move(mesh), asked.request, reporter));
   RETURN_IF_ERROR(WriteModalModel(asked.output, model, origin));
   return StoredModel{std::move(model), std::move(origin)};

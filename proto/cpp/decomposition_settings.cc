@@ -116,7 +116,10 @@ void FillInDefaults(v1::DecompositionSettings& settings) {
   if (settings.mass_matrix() == v1::MASS_MATRIX_UNSPECIFIED) {
     settings.set_mass_matrix(v1::MASS_MATRIX_CONSISTENT);
   }
-  if (settings.metres_per_unit() == 0) settings.set_metres_per_unit(1);
+}
+
+double MetresPerUnit(const v1::DecompositionSettings& settings) {
+  return settings.metres_per_unit() == 0 ? 1 : settings.metres_per_unit();
 }
 
 absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
@@ -127,7 +130,7 @@ absl::Status CheckSettings(const v1::DecompositionSettings& settings) {
                      " after rounding to 1e-4; it must be greater than -1 and less than 0.5, such "
                      "as 0.49 for rubber"));
   }
-  if (!(std::isfinite(settings.metres_per_unit()) && settings.metres_per_unit() > 0)) {
+  if (!(std::isfinite(settings.metres_per_unit()) && settings.metres_per_unit() >= 0)) {
     return Invalid(absl::StrCat("metres_per_unit is ", settings.metres_per_unit(),
                                 "; it must be greater than zero"));
   }
@@ -146,9 +149,9 @@ std::string SettingsText(const v1::DecompositionSettings& settings) {
       "poisson_1e-4 ", std::lround(settings.poisson_ratio() * kPoissonSteps), "\n",  //
       "element ", settings.element() == v1::ELEMENT_LINEAR ? "linear" : "quadratic", "\n", "mass ",
       settings.mass_matrix() == v1::MASS_MATRIX_LUMPED ? "lumped" : "consistent", "\n",
-      "metres_per_unit ", ShortestDecimal(settings.metres_per_unit()), "\n",  //
-      "keep_surface ", KeepSurface(settings.mesh()), "\n",                    //
-      "target_node_count ", settings.mesh().target_node_count(), "\n",        //
+      "metres_per_unit ", ShortestDecimal(MetresPerUnit(settings)), "\n",  //
+      "keep_surface ", KeepSurface(settings.mesh()), "\n",                 //
+      "target_node_count ", settings.mesh().target_node_count(), "\n",     //
       LaterLines(settings), FixtureLines(settings), RegionLines(settings));
 }
 

@@ -11,12 +11,15 @@ namespace carillon {
 /// This file has the rules of v1::DecompositionSettings for the daemon and for carillon-precompute.
 
 /// Gives absent fields their default values. Poisson's ratio has no default, because it belongs to
-/// a material.
+/// a material; metres_per_unit stays zero, because a large body needs a unit that somebody stated.
 void FillInDefaults(v1::DecompositionSettings& settings);
 
 /// Checks settings that FillInDefaults has completed. Errors: InvalidArgument (INVALID_SETTINGS;
 /// the message names the field, its value and its range).
 absl::Status CheckSettings(const v1::DecompositionSettings& settings);
+
+/// Returns the length of one unit of the mesh file, m: 1 unless the settings state another.
+double MetresPerUnit(const v1::DecompositionSettings& settings);
 
 /// Returns the text of the settings, from which a modal model's name is made. It has one line "key
 /// value" for each setting, in a fixed order. Two models of one mesh file are the same exactly if

@@ -92,6 +92,7 @@ JobStep End(ActiveJob job, const Outcome& outcome) {
 
 // A request with other hints has come while the job ran, and the result may depend on them.
 bool LeavesHintsUnserved(const ActiveJob& job, const Outcome& outcome) {
+  if (StatesUnit(job.request) && outcome.error.reason() == "MESH_UNIT_UNCLEAR") return true;
   if (SameHints(job.request, job.given)) return false;
   return outcome.verdict == Verdict::kOk ||
          (outcome.verdict == Verdict::kBadInput && DependsOnHints(outcome.error.reason()));

@@ -54,6 +54,23 @@ TEST_F(ProgramFindingsTest, ABodyWithoutAModeInTheBandIsRefusedAfterOneMesh) {
   EXPECT_LT(children.ru_maxrss, 300 << 10);  // KiB; finer meshes took 2 GiB
 }
 
+TEST_F(ProgramFindingsTest, ALargeBodyIsMadeOfMetresOnlyIfTheUnitIsStated) {
+  WriteBox(bar, {202, 20, 10});
+  const std::string options =
+      bar + " --out " + model + " --element linear --nodes 100 --json" + kSteel;
+  const Result refused = Run(options);
+  EXPECT_EQ(ReasonOf(refused), "MESH_UNIT_UNCLEAR");
+  for (const Json& remedy : Json::parse(refused.output).at("error").at("remedies")) {
+    EXPECT_EQ(remedy.at("option"), "--unit");
+    const std::string unit = remedy.at("value");
+    const Result made = Run(options + " --unit " + unit);
+    ASSERT_EQ(made.exit_status, 0) << unit;
+    std::filesystem::remove(model);
+    const Json lengths = Json::parse(made.output).at("body").at("lengths_m");
+    EXPECT_NEAR(lengths[0].get<double>(), 202 * std::stod(unit), 1e-6 * std::stod(unit));
+  }
+}
+
 TEST_F(ProgramFindingsTest, SizePutsTheFirstModeIntoANarrowBand) {
   const Result result = RunBar(std::string(kSteel) + " --band 20:30");
   EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");

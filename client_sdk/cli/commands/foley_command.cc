@@ -143,6 +143,7 @@ class FoleyModels {
     request.set_mesh_digest(std::move(digest));
     request.set_mesh_format("obj");
     request.mutable_material()->set_preset(sounds.material);
+    request.mutable_settings()->set_metres_per_unit(1);
     request.mutable_settings()->mutable_mesh()->set_wall_m(sounds.wall_m);
     request.mutable_settings()->mutable_mesh()->set_repair(sounds.repair);
     request.set_size(1);

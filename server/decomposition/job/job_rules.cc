@@ -63,6 +63,10 @@ absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record
                  absl::StrCat("jobs/", record.digest, " cannot be read: create its model again"));
 }
 
+bool StatesUnit(const v1::CreateModalModelRequest& request) {
+  return request.settings().metres_per_unit() > 0;
+}
+
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
   return LeavesBandOpen(a) == LeavesBandOpen(b) && WantedEigenvalue(a) == WantedEigenvalue(b) &&
          UnitEigenvalue(a, a.min_frequency_hz()) == UnitEigenvalue(b, b.min_frequency_hz());
@@ -71,17 +75,21 @@ bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelR
 bool WantsMore(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b) {
   const double wanted = WantedEigenvalue(a);
   const double other = WantedEigenvalue(b);
-  return wanted > other || (wanted == other && !LeavesBandOpen(a) && LeavesBandOpen(b));
+  return wanted > other || (wanted == other && ((!LeavesBandOpen(a) && LeavesBandOpen(b)) ||
+                                                (StatesUnit(a) && !StatesUnit(b))));
 }
 
 bool DependsOnHints(const std::string& reason) {
-  return IsOneOf<3>(reason, {"NO_MODE_IN_BAND", "TOO_MANY_MODES", "VERIFICATION_FAILED"});
+  return IsOneOf<4>(
+      reason, {"NO_MODE_IN_BAND", "TOO_MANY_MODES", "VERIFICATION_FAILED", "MESH_UNIT_UNCLEAR"});
 }
 
 bool WouldFailAgain(const JobRecord& record, const v1::CreateModalModelRequest& request) {
   if (record.state != v1::JOB_STATE_FAILED || !record.remembered) return false;
   const auto refused = ParseRequest(record);
-  return !DependsOnHints(record.error.reason()) || (refused.ok() && SameHints(*refused, request));
+  if (!DependsOnHints(record.error.reason())) return true;
+  return refused.ok() && SameHints(*refused, request) &&
+         StatesUnit(*refused) == StatesUnit(request);
 }
 
 bool DependsOnWay(const Outcome& outcome) {

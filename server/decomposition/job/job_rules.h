@@ -30,12 +30,15 @@ absl::StatusOr<v1::CreateModalModelRequest> ParseRequest(const JobRecord& record
 /// leave its upper end open.
 bool SameHints(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
+/// Returns whether a request states the unit of its mesh file, so that a large body is computed.
+bool StatesUnit(const v1::CreateModalModelRequest& request);
+
 /// Returns whether `a` wants modes that a job for `b` may leave out, because the band of `a` ends
-/// higher, or because both bands end alike and only that of `b` is open.
+/// higher, or because both bands end alike and only that of `b` is open, or only `a` states a unit.
 bool WantsMore(const v1::CreateModalModelRequest& a, const v1::CreateModalModelRequest& b);
 
-/// Returns whether a refusal for this reason depends on the band, so that a request with other
-/// hints may succeed.
+/// Returns whether a refusal for this reason depends on the hints, so that a request with others
+/// may succeed.
 bool DependsOnHints(const std::string& reason);
 
 /// Returns whether the job has failed for a reason that would recur with this request.

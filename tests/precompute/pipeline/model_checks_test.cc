@@ -8,6 +8,7 @@
 
 #include "precompute/pipeline/model_warnings.h"
 #include "precompute/pipeline/usual_goal.h"
+#include "proto/cpp/error_reason.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -47,6 +48,19 @@ TEST(CheckBand, AModeMustLieAtTheLowerEndOfTheBandOrAbove) {
   EXPECT_THAT(refused.ToString(), HasSubstr("NO_MODE_IN_BAND"));
   EXPECT_THAT(refused.ToString(),
               HasSubstr("its first is 50 Hz and the last below the band is 90"));
+}
+
+/// A hundred wavelengths of 5172 m/s at 20 kHz are 25.9 m, and at 1 kHz 517 m.
+TEST(CheckUnit, ABodyOfMoreThan20MetresAndAHundredWavelengthsNeedsAUnit) {
+  IntendedUse use = Use();
+  EXPECT_TRUE(CheckUnit(202, use).ok()) << "it costs little up to 1 kHz";
+  use.high_hz = 20'000;
+  EXPECT_TRUE(CheckUnit(25, use).ok());
+  EXPECT_EQ(ToErrorInfo(CheckUnit(27, use)).reason(), "MESH_UNIT_UNCLEAR");
+  use.young_pa = 1e6;
+  EXPECT_TRUE(CheckUnit(19, use).ok()) << "a jelly of a usual size";
+  use.size = 2;
+  EXPECT_TRUE(CheckUnit(202, use).ok()) << "whoever scales a body knows its unit";
 }
 
 TEST(IsSurelyAboveBand, TheLowestModeMustLieAboveByMoreThanTwiceItsError) {

@@ -8,6 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "proto/cpp/decomposition_settings.h"
+
 namespace carillon::precompute {
 namespace {
 
@@ -28,7 +30,7 @@ TEST(WorkerRequest, ACompleteRequestHasEveryDefault) {
   const auto complete = Complete(Steel());
   ASSERT_TRUE(complete.ok()) << complete.status();
   EXPECT_EQ(complete->size(), 1);
-  EXPECT_EQ(complete->settings().metres_per_unit(), 1);
+  EXPECT_EQ(MetresPerUnit(complete->settings()), 1);
   EXPECT_EQ(MeshingOf(*complete).nodes_per_element, 10);
   EXPECT_EQ(MassSharingOf(*complete), MassSharing::kConsistent);
   EXPECT_FALSE(GoalOf(*complete).given());

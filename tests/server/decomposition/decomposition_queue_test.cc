@@ -97,6 +97,23 @@ TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBa
   EXPECT_EQ(RunCount(), 2U);
 }
 
+TEST_F(DecompositionQueueTest, ABodyOfUnclearUnitIsTriedAgainWhereTheRequestStatesOne) {
+  WriteBytes(folder_ / "events", ErrorBytes("MESH_UNIT_UNCLEAR"));
+  MakeQueue(absl::StrCat(kCount, "grep -q 'metres_per_unit: 1$' \"$request\" || ",
+                         "{ cat \"$here/events\" >&3; exit 1; }\n", kSucceed));
+  v1::CreateModalModelRequest stated = Request(20'000);
+  stated.mutable_settings()->set_metres_per_unit(1);
+  const v1::Job refused = SubmitAndAwaitEnd(Request(20'000));
+  EXPECT_EQ(refused.error().reason(), "MESH_UNIT_UNCLEAR");
+  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_FAILED);
+  EXPECT_EQ(RunCount(), 1U);
+  const v1::Job made = SubmitAndAwaitEnd(stated);
+  EXPECT_EQ(made.name(), refused.name());
+  EXPECT_EQ(made.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Submit(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunCount(), 2U);
+}
+
 TEST_F(DecompositionQueueTest, AWorkerThatIsEndedFromOutsideTwiceFailsButNotForEver) {
   for (const char* signal : {"TERM", "KILL"}) {
     std::filesystem::remove(folder_ / "runs");

@@ -101,6 +101,16 @@ TEST(JobMachine, ARequestThatReachesFartherExtendsTheJobAndRepeatsItsRun) {
       << "which depends on the mesh alone";
 }
 
+TEST(JobMachine, ARequestThatStatesTheUnitRepeatsARunThatLackedItAndNoOther) {
+  v1::CreateModalModelRequest stated = RequestUpTo(1000);
+  stated.mutable_settings()->set_metres_per_unit(1);
+  const JobStep step = Transition(JobIn(JobStage::kRuns), Submitted{stated, "three"});
+  const Outcome unclear = Failed(Verdict::kBadInput, "MESH_UNIT_UNCLEAR");
+  EXPECT_EQ(Transition(step.job, RunEnded{unclear}).action, JobAction::kWaitAgain);
+  EXPECT_EQ(Transition(step.job, RunEnded{{.verdict = Verdict::kOk}}).action, JobAction::kEnd);
+  EXPECT_EQ(OnEndOf(JobStage::kRuns, unclear).action, JobAction::kEnd);
+}
+
 TEST(JobMachine, ATransferRunsAgainAfterItsModelWasReplaced) {
   JobWishes wishes;
   wishes.Add("three");
