@@ -139,12 +139,17 @@ Deviation Compare(const SurfaceMesh& given, const NearestTriangle& on_given,
 
 }  // namespace
 
-std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles) {
-  if (surface.triangles.size() <= kMaxUncoarsenedTriangles) return std::nullopt;
+std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles,
+                                               TriangleOrigin origin) {
+  constexpr double kTrianglesPerPlain = 4;  // edges half as long
+  const bool wrap = origin == TriangleOrigin::kWrap;
+  if (!wrap && surface.triangles.size() <= kMaxUncoarsenedTriangles) return std::nullopt;
   const Extent extent = Measure(surface);
   const NearestTriangle on_given(surface);
   const double most = kWorthwhile * static_cast<double>(surface.triangles.size());
-  for (double count = WantedTriangles(extent, most_triangles); count < most; count *= kGrowth) {
+  double count = WantedTriangles(extent, most_triangles);
+  if (wrap) count /= kTrianglesPerPlain;
+  for (; count < most; count *= kGrowth) {
     absl::StatusOr<SurfaceMesh> coarse =
         RemeshSurface(surface, EdgeForTriangles(extent, count), kSharpDegrees);
     if (!coarse.ok() || static_cast<double>(coarse->triangles.size()) > most) continue;

@@ -12,6 +12,12 @@ namespace carillon::precompute {
 /// A surface of at most this many triangles is never coarsened.
 inline constexpr size_t kMaxUncoarsenedTriangles = 20'000;
 
+/// Where the triangles of a surface come from.
+enum class TriangleOrigin {
+  kGiven,  ///< whoever made the surface may have chosen them for its modes
+  kWrap,   ///< WrapSurface, whose triangles have one size and say nothing about the body
+};
+
 struct CoarsenedSurface {
   SurfaceMesh surface;
   std::string remark;  ///< describes the change
@@ -26,8 +32,12 @@ struct CoarsenedSurface {
 /// surface moves by at most a hundredth of the body's thickness at that place (root mean square),
 /// and at most by half of it anywhere. The result passes CheckSurface.
 ///
-/// Returns nothing if the surface has at most kMaxUncoarsenedTriangles triangles, or if no surface
-/// with two thirds of its triangles keeps these limits. `surface` must pass CheckSurface.
-std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles);
+/// A wrap gets edges as long as a surface of few triangles, so that a repaired body costs about as
+/// much as a sound one.
+///
+/// Returns nothing if a given surface has at most kMaxUncoarsenedTriangles triangles, or if no
+/// surface with two thirds of its triangles keeps these limits. `surface` must pass CheckSurface.
+std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles,
+                                               TriangleOrigin origin = TriangleOrigin::kGiven);
 
 }  // namespace carillon::precompute

@@ -140,8 +140,10 @@ absl::Status WithRemediesOfHoles(absl::Status refusal, const SurfaceMesh& given)
   return refusal;
 }
 
-/// Repairs the surface until it passes the checks, and describes the repairs in `warnings`.
-absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings) {
+/// Repairs the surface until it passes the checks, and describes the repairs in `warnings`. Sets
+/// `origin` to that of the triangles.
+absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings,
+                                   TriangleOrigin& origin) {
   RepairedSurface repaired = RepairInPlace(given);
   const absl::StatusOr<Warnings> sound = RepairWithoutWrapping(repaired);
   if (sound.ok()) {
@@ -154,6 +156,7 @@ absl::StatusOr<SurfaceMesh> Repair(const SurfaceMesh& given, Warnings& warnings)
   ASSIGN_OR_RETURN(RepairedSurface wrapped, WrapSurface(repaired.surface));
   AddTo(warnings, repaired.remarks);
   AddTo(warnings, wrapped.remarks);
+  origin = TriangleOrigin::kWrap;
   return std::move(wrapped.surface);
 }
 
@@ -195,9 +198,10 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   absl::Status sound = as_given.status();
   if (as_given.ok()) prepared.warnings = *as_given;
   if (!sound.ok() && BeyondRepair(sound)) return sound;
+  TriangleOrigin origin = TriangleOrigin::kGiven;
   // An open sheet that is to get a wall needs no repair.
   if (!sound.ok() && settings.repair && !(settings.wall_m > 0 && Is(sound, "MESH_NOT_CLOSED"))) {
-    absl::StatusOr<SurfaceMesh> repaired = Repair(given, prepared.warnings);
+    absl::StatusOr<SurfaceMesh> repaired = Repair(given, prepared.warnings, origin);
     sound = repaired.ok() ? absl::OkStatus() : WithFirstFault(repaired.status(), sound);
     if (repaired.ok()) {
       prepared.surface = *std::move(repaired);
@@ -219,7 +223,7 @@ absl::StatusOr<PreparedSurface> PrepareSurface(const SurfaceMesh& given,
   }
   bool changed = settings.wall_m > 0 || !as_given.ok();
   if (settings.coarsen) {
-    if (auto coarse = CoarsenSurface(prepared.surface, settings.most_triangles)) {
+    if (auto coarse = CoarsenSurface(prepared.surface, settings.most_triangles, origin)) {
       prepared.surface = std::move(coarse->surface);
       prepared.warnings.push_back(std::move(coarse->remark));
       prepared.frequency_error = coarse->frequency_error;

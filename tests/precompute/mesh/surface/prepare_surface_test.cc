@@ -128,6 +128,18 @@ TEST(PrepareSurface, BodiesThatCrossAreUnitedByAWrap) {
   EXPECT_THAT(united->warnings[0], HasSubstr("wrapped"));
 }
 
+TEST(PrepareSurface, AWrapMayBeMadeAsCoarseAsASoundBody) {
+  SurfaceMesh cross = MakeBoxSurface({0.2, 0.05, 0.05});
+  AddShell(cross, MakeBoxSurface({0.05, 0.2, 0.05}), {0.075, -0.075, 0});
+  const auto fine = PrepareSurface(cross, {.repair = true});
+  const auto coarse = PrepareSurface(cross, {.repair = true, .coarsen = true});
+  ASSERT_TRUE(fine.ok() && coarse.ok()) << coarse.status();
+  EXPECT_LT(5 * coarse->surface.triangles.size(), fine->surface.triangles.size());
+  EXPECT_NEAR(EnclosedVolume(coarse->surface) / EnclosedVolume(fine->surface), 1, 0.01);
+  EXPECT_GT(coarse->frequency_error, 0);
+  EXPECT_LE(coarse->frequency_error, 0.01);
+}
+
 TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
   const SurfaceMesh ball = MakeSphereSurface(0.1, 3);
   SurfaceMesh open = ball;
