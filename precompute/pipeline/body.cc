@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -12,6 +13,7 @@
 #include "precompute/mesh/fill/midside_nodes.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/read/read_mesh.h"
+#include "precompute/mesh/surface/check_surface.h"
 #include "precompute/pipeline/body_regions.h"
 #include "precompute/pipeline/model_checks.h"
 #include "precompute/pipeline/worker_request.h"
@@ -94,13 +96,33 @@ double ExtentOf(const Mesh& mesh) {
   return Diagonal(std::get<SurfaceMesh>(mesh).vertices);
 }
 
+/// Returns the outside of a body of one material whose regions touch in faces or rims that they
+/// share; nothing if they do not.
+std::optional<PreparedSurface> JoinRegions(const SurfaceMesh& given,
+                                           const std::vector<int32_t>& region_of_triangle,
+                                           const MeshNames& names) {
+  if (names.regions.size() < 2) return std::nullopt;
+  std::vector<std::string> shown;
+  shown.reserve(names.regions.size());
+  for (const MeshRegion& region : names.regions) shown.push_back(QuotedText(region.name));
+  absl::StatusOr<PreparedSurface> joined = PrepareParts(given, region_of_triangle, shown);
+  if (!joined.ok()) return std::nullopt;
+  joined->walls.clear();
+  joined->parts.clear();
+  return *std::move(joined);
+}
+
 absl::StatusOr<PreparedSurface> Prepare(const SurfaceMesh& given,
                                         const std::vector<int32_t>& region_of_triangle,
-                                        const BodyMaterials& materials,
+                                        const MeshNames& names, const BodyMaterials& materials,
                                         const worker::v1::WorkerRequest& request) {
   const v1::DecompositionSettings& settings = request.settings();
   const v1::MeshSettings& mesh = settings.mesh();
   if (settings.regions().empty()) {
+    if (mesh.wall_m() == 0 && !region_of_triangle.empty() && !CheckSurface(given).ok()) {
+      std::optional<PreparedSurface> joined = JoinRegions(given, region_of_triangle, names);
+      if (joined) return *std::move(joined);
+    }
     return PrepareSurface(given, {.repair = mesh.repair(),
                                   .wall_m = mesh.wall_m(),
                                   .coarsen = MayCoarsen(request),
@@ -111,12 +133,12 @@ absl::StatusOr<PreparedSurface> Prepare(const SurfaceMesh& given,
                    "repair and wall are for a body of one material: leave them out, or repair the "
                    "parts of the body before they are put together");
   }
-  std::vector<std::string> names;
-  names.reserve(materials.regions().size());
+  std::vector<std::string> shown;
+  shown.reserve(materials.regions().size());
   for (const RegionMaterial& region : materials.regions()) {
-    names.push_back(QuotedText(region.region));
+    shown.push_back(QuotedText(region.region));
   }
-  return PrepareParts(given, region_of_triangle, names);
+  return PrepareParts(given, region_of_triangle, shown);
 }
 
 }  // namespace
@@ -145,9 +167,11 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
     return body;
   }
   auto& given = std::get<SurfaceMesh>(read.mesh);
+  std::vector<int32_t> region_of_triangle = read.names.triangle_regions;
   number(read.names.triangle_regions);
+  if (!settings.regions().empty()) region_of_triangle = read.names.triangle_regions;
   absl::StatusOr<PreparedSurface> prepared =
-      Prepare(given, read.names.triangle_regions, regions.materials, request);
+      Prepare(given, region_of_triangle, read.names, regions.materials, request);
   if (!prepared.ok()) return WithExtent(prepared.status(), given);
   std::ranges::move(read.warnings, std::back_inserter(prepared->warnings));
   return Fillable{std::move(given), *std::move(prepared), std::move(regions.materials),

@@ -71,6 +71,34 @@ TEST_F(ProgramFindingsTest, ALargeBodyIsMadeOfMetresOnlyIfTheUnitIsStated) {
   }
 }
 
+// Two closed boxes in a row, which share a face, and the one box that they are together.
+TEST_F(ProgramFindingsTest, PartsThatShareAFaceAreOneBodyOfOneMaterial) {
+  const std::string options = " --out " + model + " --unit mm --nodes 300 --json";
+  const auto first_hz = [&] {
+    const Result made = Run(bar + options + kSteel);
+    EXPECT_EQ(made.exit_status, 0) << made.output;
+    std::filesystem::remove(model);
+    return Json::parse(made.output).at("modes")[0].at("frequency_hz").get<double>();
+  };
+  WriteBox(bar, {200, 16, 10});
+  const double whole_hz = first_hz();
+  std::ofstream file(bar);
+  for (int part = 0; part < 2; ++part) {
+    file << "o part" << part << "\nusemtl colour" << part << "\n";
+    const SurfaceMesh box = MakeBoxSurface({100, 16, 10});
+    for (const auto& [x, y, z] : box.vertices) {
+      file << "v " << x + 100 * part << " " << y << " " << z << "\n";
+    }
+    const auto count = static_cast<int>(box.vertices.size());
+    for (const auto& [a, b, c] : box.triangles) {
+      file << "f " << a + 1 + count * part << " " << b + 1 + count * part << " "
+           << c + 1 + count * part << "\n";
+    }
+  }
+  file.close();
+  EXPECT_NEAR(first_hz() / whole_hz, 1, 0.005) << "the estimated errors";
+}
+
 TEST_F(ProgramFindingsTest, SizePutsTheFirstModeIntoANarrowBand) {
   const Result result = RunBar(std::string(kSteel) + " --band 20:30");
   EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
