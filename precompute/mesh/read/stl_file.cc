@@ -71,8 +71,8 @@ class StlText {
         file_.warnings.emplace_back("what follows the last solid of the file was left out");
         break;
       } else {
-        return Fault(
-            absl::StrCat(QuotedText(word), " where a facet or the end of the solid belongs"));
+        return Fault(absl::StrCat(HasEnded() ? "the file ends" : QuotedText(word),
+                                  " where a facet or the end of the solid belongs"));
       }
     }
     return std::move(file_);
@@ -81,6 +81,9 @@ class StlText {
  private:
   std::string Next() { return absl::AsciiStrToLower(std::string(stream_.NextWord())); }
 
+  /// Whether nothing follows the last word, of which a file that was cut may have the beginning.
+  bool HasEnded() { return stream_.PeekWord().empty(); }
+
   absl::Status Fault(absl::string_view what) const {
     return StlUnreadable(absl::StrCat("line ", LineOf(bytes_, stream_.rest()), ": ", what));
   }
@@ -88,8 +91,8 @@ class StlText {
   absl::Status Expect(const char* word) {
     const std::string found = Next();
     if (found == word) return absl::OkStatus();
-    return Fault(found.empty() ? absl::StrCat("the file ends where \"", word, "\" belongs")
-                               : absl::StrCat(QuotedText(found), " where \"", word, "\" belongs"));
+    return Fault(absl::StrCat(HasEnded() ? "the file ends" : QuotedText(found), " where \"", word,
+                              "\" belongs"));
   }
 
   absl::Status ReadFacet() {
@@ -103,13 +106,15 @@ class StlText {
     std::string word = Next();
     for (; word == "vertex"; word = Next()) {
       Point p{};
-      if (!stream_.TakeAll(p)) return Fault("no vertex (\"vertex x y z\")");
+      if (!stream_.TakeAll(p)) {
+        return Fault(HasEnded() ? "the file ends within a vertex" : "no vertex (\"vertex x y z\")");
+      }
       polygon.push_back(static_cast<int32_t>(file_.vertices.size()));
       file_.vertices.push_back(p);
     }
     if (word != "endloop") {
-      return Fault(word.empty() ? "the file ends within a facet"
-                                : absl::StrCat(QuotedText(word), " where \"endloop\" belongs"));
+      return Fault(HasEnded() ? "the file ends within a facet"
+                              : absl::StrCat(QuotedText(word), " where \"endloop\" belongs"));
     }
     if (polygon.size() < 3) return Fault("a facet with fewer than three vertices");
     file_.AddPolygon(polygon);

@@ -268,8 +268,8 @@ std::vector<std::string> FindWarnings(const SurfaceMesh& surface,
   std::vector<std::string> warnings;
   const auto collapsed = std::ranges::count_if(surface.triangles, IsCollapsed);
   if (collapsed > 0) {
-    warnings.push_back(
-        absl::StrCat(collapsed, " triangles with two equal corners were passed over"));
+    warnings.push_back(absl::StrCat("passed over with two equal corners: ", collapsed,
+                                    collapsed == 1 ? " triangle" : " triangles"));
   }
   if (shells.front().volume_m3 < 0) {
     warnings.emplace_back("the surface is inside out; it was taken as if it were not");

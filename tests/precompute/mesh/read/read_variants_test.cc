@@ -144,6 +144,10 @@ TEST_F(ReadVariantsTest, OffIsReadAsItsFirstWordSays) {
 TEST_F(ReadVariantsTest, TextStlMayBeInCapitalsAndHaveSeveralSolids) {
   const std::string stl = ToTextStl(box_);
   ExpectBox(absl::AsciiStrToUpper(stl), "stl");
+  for (const char* word : {"normal", "outer", "vertex", "endloop", "endfacet"}) {
+    const std::string cut = stl.substr(0, stl.rfind(word) + 4);
+    EXPECT_THAT(Read(cut, "stl").status().ToString(), HasSubstr("the file ends")) << word;
+  }
   const size_t middle = stl.find("endfacet", stl.size() / 2) + 8;
   ExpectBox(stl.substr(0, middle) + "\nendsolid one\nsolid facet two\n" + stl.substr(middle),
             "stl");

@@ -37,7 +37,7 @@ TEST(CheckSurface, AcceptsABodyInsideOutWithAWarning) {
 TEST(CheckSurface, PassesOverCollapsedTrianglesWithAWarning) {
   SurfaceMesh box = Box();
   box.triangles.push_back({0, 1, 1});
-  EXPECT_THAT(CheckSurface(box).value(), ElementsAre(HasSubstr("1 triangles with two equal")));
+  EXPECT_THAT(CheckSurface(box).value(), ElementsAre(HasSubstr("two equal corners: 1 triangle")));
 }
 
 TEST(CheckSurface, RefusesCoordinatesThatAreNotFinite) {
