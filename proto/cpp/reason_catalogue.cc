@@ -27,6 +27,21 @@ bool IsName(absl::string_view cell) {
   });
 }
 
+/// Returns the text of a cell without the targets of its links: "[after X](#after-x)" becomes
+/// "'after X' in docs/troubleshoot.md", and a link to another page names the page.
+std::string WithoutLinks(std::string cell) {
+  for (size_t middle = cell.find("]("); middle != std::string::npos; middle = cell.find("](")) {
+    const size_t begin = cell.rfind('[', middle), end = cell.find(')', middle);
+    if (begin == std::string::npos || end == std::string::npos) break;
+    const std::string text = cell.substr(begin + 1, middle - begin - 1);
+    std::string page = cell.substr(middle + 2, end - middle - 2);
+    page = page.substr(0, page.find('#'));
+    cell.replace(begin, end + 1 - begin,
+                 absl::StrCat("'", text, "' in docs/", page.empty() ? "troubleshoot.md" : page));
+  }
+  return cell;
+}
+
 /// Reads the rows of the groups of reasons (name, codes, meaning, repair), of the section
 /// "Warnings" (name, meaning, counts, figures, repair), and of findings (name, meaning, repair).
 std::vector<CatalogueReason> ReadTables() {
@@ -43,8 +58,8 @@ std::vector<CatalogueReason> ReadTables() {
     reason.group = std::string(group);
     const bool has_code = cells.size() == 4;
     if (has_code) reason.code = cells[1];
-    reason.meaning = cells[has_code ? 2 : 1];
-    reason.repair = std::string(absl::StripSuffix(cells.back(), " |"));
+    reason.meaning = WithoutLinks(cells[has_code ? 2 : 1]);
+    reason.repair = WithoutLinks(std::string(absl::StripSuffix(cells.back(), " |")));
   }
   return reasons;
 }

@@ -22,6 +22,16 @@ TEST(ReasonCatalogue, HasEveryRowWithItsCells) {
   }));
 }
 
+TEST(ReasonCatalogue, ALinkIsTheNameOfItsPage) {
+  for (const CatalogueReason& reason : Reasons()) {
+    EXPECT_EQ((reason.meaning + reason.repair).find("]("), std::string::npos) << reason.name;
+  }
+  EXPECT_THAT(FindReason("MODELS_NOT_SERVING")->repair,
+              HasSubstr("'after DATABASE_LOST' in docs/troubleshoot.md"));
+  EXPECT_THAT(FindReason("WORK_LEFT_OUT")->repair,
+              HasSubstr("'what is left out' in docs/rendering.md"));
+}
+
 TEST(ReasonCatalogue, IsFoundByNameInAnyLettersAndByAWholeMessage) {
   for (const char* text : {"MESH_NOT_CLOSED", "mesh_not_closed", "MESH_NOT_CLOSED: 3 edges"}) {
     const auto reason = FindReason(text);
