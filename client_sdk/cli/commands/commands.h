@@ -188,7 +188,8 @@ absl::Status DeleteModels(const client::Client& daemon, const std::vector<std::s
                           bool json);
 absl::Status ListJobs(const client::Client& daemon, const v1::ListJobsRequest& filter, bool json);
 absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool json);
-absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json);
+absl::Status CancelJobs(const client::Client& daemon, const std::vector<std::string>& texts,
+                        bool json);
 /// Explains an error reason or a warning, or lists all if `name` is empty. Errors: InvalidArgument
 /// (UNKNOWN_REASON).
 absl::Status Explain(const std::string& name, bool json);

@@ -2,6 +2,7 @@
 #include "client_sdk/cli/commands/find_model.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <string>
 #include <vector>
@@ -167,8 +168,15 @@ std::string OtherLabel(const v1::ModalModelSummary& model, const std::string& wa
 absl::StatusOr<std::string> FindJob(const client::Client& daemon, const std::string& text) {
   if (absl::StartsWith(text, kJobs)) return text;
   ASSIGN_OR_RETURN(const auto jobs, daemon.ListJobs());
-  return Choose(jobs, std::string(absl::StripPrefix(text, kModels)),
-                {kJobs, "JOB_NOT_FOUND", "NAME_AMBIGUOUS", "job"});
+  const std::string wanted(absl::StripPrefix(text, kModels));
+  const Wording wording{kJobs, "JOB_NOT_FOUND", "NAME_AMBIGUOUS", "job"};
+  // A label means the job that has not ended rather than those that have.
+  std::vector<v1::Job> active;
+  std::ranges::copy_if(jobs, std::back_inserter(active), [](const v1::Job& job) {
+    return job.state() == v1::JOB_STATE_QUEUED || job.state() == v1::JOB_STATE_RUNNING;
+  });
+  auto found = Choose(active, wanted, wording);
+  return absl::IsNotFound(found.status()) ? Choose(jobs, wanted, wording) : found;
 }
 
 }  // namespace carillon::cli

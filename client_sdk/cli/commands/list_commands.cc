@@ -101,6 +101,8 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
   return absl::OkStatus();
 }
 
+namespace {
+
 absl::Status CancelJob(const client::Client& daemon, const std::string& text, bool json) {
   ASSIGN_OR_RETURN(const std::string name, FindJob(daemon, text));
   // The daemon answers alike for a job that this call cancels and for one that was cancelled
@@ -117,6 +119,20 @@ absl::Status CancelJob(const client::Client& daemon, const std::string& text, bo
   if (end.empty()) return absl::OkStatus();
   return Refusal(absl::StatusCode::kFailedPrecondition, "JOB_ENDED",
                  absl::StrCat(job.name(), " has already ", end, ", so there is nothing to cancel"));
+}
+
+}  // namespace
+
+absl::Status CancelJobs(const client::Client& daemon, const std::vector<std::string>& texts,
+                        bool json) {
+  absl::Status first_error;
+  for (const std::string& text : texts) {
+    const absl::Status ended = CancelJob(daemon, text, json);
+    if (ended.ok()) continue;
+    if (!first_error.ok()) (void)Report(first_error);
+    first_error = ended;
+  }
+  return first_error;
 }
 
 absl::Status ListMaterials(const client::Client& daemon, bool json) {

@@ -125,12 +125,14 @@ void AddJob(CLI::App& app, Program& program) {
     program.command = [&program, text] { return ShowJob(*program.Daemon(), text, program.json); };
   });
   AddJobWatch(job, named, program);
-  AddAbout(job, "cancel", "Cancel a job that has not ended", named,
-           [&program](const std::string& text) {
-             program.command = [&program, text] {
-               return CancelJob(*program.Daemon(), text, program.json);
-             };
-           });
+  auto cancelled = std::make_shared<std::vector<std::string>>();
+  CLI::App& cancel = *job.add_subcommand("cancel", "Cancel jobs that have not ended");
+  cancel.add_option("job", *cancelled, named)->required();
+  cancel.callback([&program, cancelled] {
+    program.command = [&program, cancelled] {
+      return CancelJobs(*program.Daemon(), *cancelled, program.json);
+    };
+  });
   AddJobRun(job, program);
 }
 
@@ -139,6 +141,12 @@ void AddMaterials(CLI::App& app, Program& program) {
   CLI::App& material = *app.add_subcommand(
       "material", "List the named materials, show the figures of one, or find one by recordings");
   material.add_option("material", *name, "The name of a material [a list of all]");
+  AddAbout(material, "show", "Show the figures of a material", "The name of the material",
+           [&program](const std::string& shown) {
+             program.command = [&program, shown] {
+               return ShowMaterial(*program.Daemon(), shown, program.json);
+             };
+           });
   AddMaterialFit(material, program);
   material.callback([&program, &material, name] {
     if (!material.get_subcommands().empty()) return;

@@ -28,8 +28,8 @@ std::string WhyUnavailable(const std::string& text, const std::string& server) {
   }
   if (closed && !absl::StartsWith(server, "unix:")) {
     return absl::StrCat("the program at ", server, " closed the connection (", text,
-                        "); if it is a daemon with TLS, give the roots that vouch for it "
-                        "(--tls-roots)");
+                        "): it ended, and its log says why, or it is a daemon with TLS, for which "
+                        "give the roots that vouch for it (--tls-roots)");
   }
   return absl::StrCat("no carillond answers at ", server, " (", text,
                       "); start it there, or name another address");

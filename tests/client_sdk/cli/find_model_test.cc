@@ -41,19 +41,31 @@ class DaemonWithJob : public client::Client {
   absl::StatusOr<v1::ListJobsResponse> ListJobsPage(const v1::ListJobsRequest&) const override {
     v1::ListJobsResponse list;
     *list.add_jobs() = job_;
+    if (!other_.name().empty()) *list.add_jobs() = other_;
     return list;
   }
 
   v1::Job& job() { return job_; }
+  v1::Job& other() { return other_; }
 
  private:
-  v1::Job job_;
+  v1::Job job_, other_;
 };
 
 std::string MessageOf(const client::Client& daemon, const std::string& text) {
   const v1::ErrorInfo error = ToErrorInfo(FindModel(daemon, text).status());
   EXPECT_EQ(error.reason(), "MODAL_MODEL_NOT_FOUND");
   return error.message();
+}
+
+TEST(FindJob, ALabelMeansTheJobThatHasNotEnded) {
+  DaemonWithJob daemon(v1::JOB_STATE_FAILED);
+  daemon.other() = daemon.job();
+  daemon.other().set_name("jobs/" + std::string(64, 'b'));
+  EXPECT_EQ(ToErrorInfo(FindJob(daemon, "bell").status()).reason(), "NAME_AMBIGUOUS");
+  daemon.other().set_state(v1::JOB_STATE_QUEUED);
+  EXPECT_EQ(FindJob(daemon, "bell").value(), daemon.other().name());
+  EXPECT_EQ(FindJob(daemon, "aaaa").value(), daemon.job().name());
 }
 
 TEST(FindModel, SaysThatTheJobOfAModelWaitsOrRunsAndHowToWaitForIt) {
