@@ -3,9 +3,11 @@
 // `carillon model create FILE...`
 #include <algorithm>
 #include <chrono>
-#include <deque>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <set>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -72,20 +74,8 @@ absl::StatusOr<v1::Job> RequestModel(const client::Client& daemon,
 
 bool HelpsToRepair(const v1::Remedy& remedy) { return remedy.field() == "settings.mesh.repair"; }
 
-/// Waits for the job of one file. A surface that is refused, and that repair may help, is asked for
-/// again with repair; where that fails, too, its refusal is returned, which also names the first.
-absl::StatusOr<v1::Job> AwaitModel(const client::Client& daemon, const CreateModelOptions& options,
-                                   const std::string& file, const std::string& job) {
-  absl::StatusOr<v1::Job> ended = WatchWithProgress(daemon, job);
-  const v1::ErrorInfo refusal = ended.ok() ? v1::ErrorInfo() : ToErrorInfo(ended.status());
-  if (!options.may_repair || std::ranges::none_of(refusal.remedies(), HelpsToRepair)) return ended;
-  absl::FPrintF(stderr, "carillon: %s is asked for again with --repair: %s: %s\n", file,
-                refusal.reason(), refusal.message());
-  CreateModelOptions repairing = options;
-  repairing.settings.mutable_mesh()->set_repair(true);
-  absl::StatusOr<v1::Job> repaired = RequestModel(daemon, repairing, file);
-  if (repaired.ok()) repaired = WatchWithProgress(daemon, repaired->name());
-  return repaired;
+bool HasEnded(const v1::Job& job) {
+  return job.state() != v1::JOB_STATE_QUEUED && job.state() != v1::JOB_STATE_RUNNING;
 }
 
 /// Returns whether the daemon takes no more jobs of this client until some of them have ended.
@@ -95,21 +85,25 @@ bool MustWait(const absl::Status& error) {
 }
 
 /// Creates the models of several files. All are requested before the first is waited for, as far as
-/// the daemon takes them, so that they are computed side by side.
+/// the daemon takes them, so that they are computed side by side. A surface that is refused, and
+/// that repair may help, is asked for again with repair as soon as its refusal is known; where that
+/// fails, too, its refusal is told, which also names the first.
 class ModelCreation {
  public:
   ModelCreation(const client::Client& daemon, const CreateModelOptions& options, bool json)
-      : daemon_(daemon), options_(options), json_(json) {}
+      : daemon_(daemon), options_(options), repairing_(options), json_(json) {
+    repairing_.settings.mutable_mesh()->set_repair(true);
+  }
 
   /// Errors: Internal (OUTPUT_NOT_WRITABLE), Unavailable (SERVER_UNAVAILABLE), that of the file if
   /// there is one file, FailedPrecondition (SOME_FAILED) if there are several.
   absl::Status Run() {
     RETURN_IF_ERROR(OpenReport());
-    for (const std::string& file : options_.files) {
-      RETURN_IF_ERROR(Request(file));
+    for (size_t i = 0; i < options_.files.size(); ++i) {
+      RETURN_IF_ERROR(Request({.index = i, .begin = Clock::now()}));
     }
     while (!requested_.empty()) {
-      RETURN_IF_ERROR(FinishOldest());
+      RETURN_IF_ERROR(FinishSome());
     }
     if (failed_count_ == 0 || options_.files.size() == 1) return last_error_;
     return Refusal(absl::StatusCode::kFailedPrecondition, "SOME_FAILED",
@@ -121,10 +115,14 @@ class ModelCreation {
 
  private:
   struct Requested {
-    std::string file;
-    absl::StatusOr<v1::Job> job;
+    size_t index = 0;  ///< of the file
     Clock::time_point begin;
+    bool repairs = false;
   };
+
+  const std::string& FileOf(const Requested& requested) const {
+    return options_.files[requested.index];
+  }
 
   absl::Status OpenReport() {
     if (options_.report.empty()) return absl::OkStatus();
@@ -140,35 +138,84 @@ class ModelCreation {
                                 "permissions and the free space"));
   }
 
-  absl::Status Request(const std::string& file) {
-    const Clock::time_point begin = Clock::now();
+  absl::Status Request(const Requested& requested) {
     while (true) {
-      absl::StatusOr<v1::Job> job = RequestModel(daemon_, options_, file);
-      if (job.ok() || !options_.wait || !MustWait(job.status())) {
-        requested_.push_back({file, std::move(job), begin});
-        return absl::OkStatus();
+      const CreateModelOptions& options = requested.repairs ? repairing_ : options_;
+      const absl::StatusOr<v1::Job> job = RequestModel(daemon_, options, FileOf(requested));
+      if (!job.ok() && options_.wait && MustWait(job.status())) {
+        RETURN_IF_ERROR(AwaitPlace());
+        continue;
       }
-      if (requested_.empty()) {
-        std::this_thread::sleep_for(std::chrono::seconds(1));  // other clients fill the queue
-      } else {
-        RETURN_IF_ERROR(FinishOldest());
-      }
+      if (!job.ok()) return Fail(requested, job.status());
+      if (HasEnded(*job)) return Finish(requested, job->name());
+      if (!options_.wait) return Succeed(requested, *job);
+      requested_.emplace(job->name(), requested);
+      return absl::OkStatus();
     }
   }
 
-  absl::Status FinishOldest() {
-    Requested oldest = std::move(requested_.front());
-    requested_.pop_front();
-    if (oldest.job.ok() && options_.wait) {
-      oldest.job = AwaitModel(daemon_, options_, oldest.file, oldest.job->name());
-    }
-    const double seconds = std::chrono::duration<double>(Clock::now() - oldest.begin).count();
-    return oldest.job.ok() ? Succeed(oldest.file, *oldest.job, seconds)
-                           : Fail(oldest.file, oldest.job.status());
+  absl::Status AwaitPlace() {
+    if (!requested_.empty()) return FinishSome();
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // other clients fill the queue
+    return absl::OkStatus();
   }
 
-  absl::Status Succeed(const std::string& file, const v1::Job& job, double seconds) {
-    std::vector<JsonMember> members = {{"file", file}, {"seconds", seconds}};
+  /// Waits until one of the requested jobs has ended, and finishes the files of those that have.
+  absl::Status FinishSome() {
+    std::set<std::string> ended;
+    if (options_.files.size() == 1) {
+      ended = {requested_.begin()->first};  // Finish waits for it, and shows its progress
+    } else {
+      ASSIGN_OR_RETURN(ended, AwaitSome());
+    }
+    for (const std::string& job : ended) {
+      while (true) {
+        const auto at = requested_.find(job);
+        if (at == requested_.end()) break;
+        const Requested requested = at->second;
+        requested_.erase(at);
+        RETURN_IF_ERROR(Finish(requested, job));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  /// Returns those of the requested jobs that have ended, at least one.
+  absl::StatusOr<std::set<std::string>> AwaitSome() {
+    std::set<std::string> active, ended;
+    RETURN_IF_ERROR(daemon_.WatchJobs({}, [&](const v1::WatchJobsResponse& answer) {
+      const std::string& name = answer.job().name();
+      if (answer.has_job() && requested_.contains(name)) {
+        (HasEnded(answer.job()) ? ended : active).insert(name);
+      }
+      // What is not among the jobs that wait or run has ended before.
+      for (auto at = requested_.begin(); !answer.has_job() && at != requested_.end(); ++at) {
+        if (!active.contains(at->first)) ended.insert(at->first);
+      }
+      return ended.empty();
+    }));
+    return ended;
+  }
+
+  absl::Status Finish(const Requested& requested, const std::string& name) {
+    const absl::StatusOr<v1::Job> job = options_.files.size() == 1 && options_.wait
+                                            ? WatchWithProgress(daemon_, name)
+                                            : daemon_.WatchJob(name, nullptr);
+    if (job.ok()) return Succeed(requested, *job);
+    const v1::ErrorInfo refusal = ToErrorInfo(job.status());
+    const bool repairs = options_.wait && options_.may_repair && !requested.repairs &&
+                         std::ranges::any_of(refusal.remedies(), HelpsToRepair);
+    if (!repairs) return Fail(requested, job.status());
+    absl::FPrintF(stderr, "carillon: %s is asked for again with --repair: %s: %s\n",
+                  EscapedText(FileOf(requested)), refusal.reason(), refusal.message());
+    return Request({.index = requested.index, .begin = requested.begin, .repairs = true});
+  }
+
+  absl::Status Succeed(const Requested& requested, const v1::Job& job) {
+    const std::string& file = FileOf(requested);
+    const double seconds = std::chrono::duration<double>(Clock::now() - requested.begin).count();
+    std::vector<JsonMember> members = {
+        {"file", file}, {"index", uint64_t{requested.index}}, {"seconds", seconds}};
     if (job.state() == v1::JOB_STATE_SUCCEEDED) {
       AddModel(file, job.modal_model(), members);
     } else {
@@ -180,11 +227,12 @@ class ModelCreation {
     return PrintRow(MessageJson(job, members));
   }
 
-  absl::Status Fail(const std::string& file, const absl::Status& error) {
+  absl::Status Fail(const Requested& requested, const absl::Status& error) {
     ++failed_count_;
     last_error_ = error;
     if (ToErrorInfo(error).reason() == "SERVER_UNAVAILABLE") return error;
-    const std::string members = MembersJson({{"file", file}});
+    const std::string& file = FileOf(requested);
+    const std::string members = MembersJson({{"file", file}, {"index", uint64_t{requested.index}}});
     const std::string row =
         absl::StrCat(members.substr(0, members.size() - 1), ",", ErrorJson(error).substr(1));
     if (options_.files.size() == 1) return WriteRow(row);  // the command ends with the error
@@ -231,9 +279,10 @@ class ModelCreation {
 
   const client::Client& daemon_;
   const CreateModelOptions& options_;
+  CreateModelOptions repairing_;
   const bool json_;
   std::ofstream report_;
-  std::deque<Requested> requested_;
+  std::multimap<std::string, Requested> requested_;  ///< by the job, which files may share
   size_t failed_count_ = 0;
   absl::Status last_error_;
 };

@@ -13,7 +13,7 @@ import carillon as carillon_package
 import meshes
 import sound
 from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2, scene_service_pb2
-from daemon import BIN, ROOT, DaemonTest
+from daemon import BIN, ROOT, Daemon, DaemonTest
 
 MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 
@@ -63,6 +63,17 @@ class ListsTest(CommandLineTest):
         self.run_command("job", "cancel", "long\u202e")
         ended = self.daemon.command("job", "watch", "long\u202e", check=False)
         self.assertIn("JOB_CANCELLED", ended.stderr)
+
+    def test_several_jobs_are_cancelled_and_an_ended_one_is_named(self):
+        for label in ("one", "two"):
+            (self.folder / f"{label}.obj").write_bytes(meshes.obj(*meshes.box((0.2, 0.1, 0.05 + len(label) / 100))))
+        for label, nodes in (("one", 60000), ("two", 60001)):
+            self.run_command("model", "create", self.folder / f"{label}.obj", "--material", meshes.MATERIAL, "--nodes",
+                             nodes, "--no-wait")
+        ended = self.daemon.command("job", "cancel", "one", "bar", "two", check=False)
+        self.assertIn("JOB_ENDED", ended.stderr)
+        for label in ("one", "two"):
+            self.assertIn("JOB_CANCELLED", self.daemon.command("job", "watch", label, check=False).stderr)
 
     def test_jobs_are_listed_and_watched_by_state_and_label(self):
         labels = [job["label"] for job in self.json_of("job", "list", "--state", "succeeded", "--label", "BAR")["jobs"]]
@@ -191,6 +202,8 @@ class ReportTest(CommandLineTest):
         self.assertEqual(done.returncode, 1)
         self.assertIn("SOME_FAILED: 2 of 4 files", done.stderr)
         rows = [json.loads(line) for line in table.read_text().splitlines()]
+        order = [row["index"] for row in rows]  # in which the jobs ended
+        rows.sort(key=lambda row: row["index"])
         self.assertEqual([row["file"] for row in rows], [str(self.folder / name) for name in names])
         self.assertEqual([row["error"]["reason"] for row in rows[1::2]], ["MESH_EMPTY", "FILE_NOT_FOUND"])
         for row in rows[::2]:
@@ -199,7 +212,33 @@ class ReportTest(CommandLineTest):
             self.assertGreater(row["node_count"], 0)
             self.assertEqual(row["warnings"], shown["header"]["warnings"])
         self.assertEqual(rows[0]["label"], "gläserne Glocke 鐘")
-        self.assertEqual(done.stdout.split(), [row["modal_model"] for row in rows[::2]])
+        self.assertEqual(done.stdout.split(), [rows[i]["modal_model"] for i in order if i % 2 == 0])
+
+    def test_a_slow_body_keeps_neither_a_row_nor_a_repair_waiting(self):
+        folder = self.folder / "batch"
+        folder.mkdir()
+        daemon = Daemon(folder, "--workers", 2)
+        self.addCleanup(daemon.stop)
+        box = meshes.box((0.05, 0.01, 0.02))
+        for name, mesh in (("slow", meshes.box((2, 2, 0.004))), ("open", (box[0], box[1][1:])),
+                           ("large", meshes.box((200, 20, 10)))):
+            (folder / f"{name}.obj").write_bytes(meshes.obj(*mesh))
+        table = folder / "table.jsonl"
+        rows = []
+        command = [BIN / "carillon", "--server", daemon.server, "model", "create", "--material", meshes.MATERIAL,
+                   "--report", table, *(folder / f"{name}.obj" for name in ("slow", "open", "large"))]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as creation:
+            creation.stdout.readline()  # the model of the repaired body; then its row is written
+            while len(rows) < 2:
+                rows = [json.loads(line) for line in table.read_text().splitlines()]
+            jobs = json.loads(daemon.command("--json", "job", "list", "--state", "running,waiting").stdout)["jobs"]
+            daemon.command("job", "cancel", "slow")
+            creation.communicate(timeout=60)
+        self.assertEqual([job["label"] for job in jobs], ["slow"])
+        self.assertEqual(sorted(row["index"] for row in rows), [1, 2])
+        of_file = {row["index"]: row for row in map(json.loads, table.read_text().splitlines())}
+        self.assertGreater(of_file[1]["node_count"], 0)
+        self.assertEqual([of_file[i]["error"]["reason"] for i in (0, 2)], ["JOB_CANCELLED", "MESH_UNIT_UNCLEAR"])
 
     def test_frequencies_and_t60_are_those_of_the_material(self):
         model = carillon_package.connect(self.daemon.server).model("bar")
