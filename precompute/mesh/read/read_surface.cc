@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "precompute/mesh/read/read_surface.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -58,12 +59,16 @@ absl::Status CheckFiniteVertices(const SurfaceFile& file) {
   return absl::OkStatus();
 }
 
-/// Counts the vertices from the returned place, and rounds them to single precision.
+/// Counts the vertices from the returned place, and rounds them to single precision. The rounded
+/// numbers go through memory, because GCC 12 leaves the rounding out of some points where a double
+/// becomes a float and a double again.
 Point RoundVertices(std::vector<Point>& vertices) {
   const Point origin = FarOrigin(vertices);
-  for (Point& p : vertices) {
-    for (size_t x = 0; x < 3; ++x) p[x] = static_cast<float>(p[x] - origin[x]);
+  std::vector<std::array<float, 3>> rounded(vertices.size());
+  for (size_t v = 0; v < vertices.size(); ++v) {
+    for (size_t x = 0; x < 3; ++x) rounded[v][x] = static_cast<float>(vertices[v][x] - origin[x]);
   }
+  for (size_t v = 0; v < vertices.size(); ++v) std::ranges::copy(rounded[v], vertices[v].begin());
   return origin;
 }
 

@@ -52,6 +52,24 @@ void ExpectSameTriangles(const SurfaceMesh& read, const SurfaceMesh& written) {
   }
 }
 
+// Files repeat vertices at seams. Each must become the same float, whatever its place in the list.
+TEST_F(ReadSurfaceTest, EqualVerticesAreOneWhereverTheyStandInTheFile) {
+  for (int before = 0; before < 8; ++before) {
+    std::string file;
+    for (int i = 0; i < before; ++i) file += "v 9 9 9\n";
+    file += "v 0.1 0.2 0.3\nv 1.1 0.2 0.3\nv 0.1 1.2 0.3\nv 0.1 0.2 1.3\n";
+    file += "v 0.1 0.2 0.3\nv 1.1 0.2 0.3\nv 0.1 1.2 0.3\n";
+    const auto face = [&](int a, int b, int c) {
+      absl::StrAppend(&file, "f ", a + before, " ", b + before, " ", c + before, "\n");
+    };
+    face(1, 3, 2), face(5, 6, 4), face(2, 7, 4), face(3, 1, 4);
+    const absl::StatusOr<NamedMesh> read = ReadNamed(file, "obj");
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(std::get<SurfaceMesh>(read->mesh).vertices.size(), 4u) << before;
+    EXPECT_TRUE(CheckSurface(std::get<SurfaceMesh>(read->mesh)).ok()) << before;
+  }
+}
+
 TEST_F(ReadSurfaceTest, ObjectsMaterialsAndSolidsAreRegions) {
   const absl::StatusOr<NamedMesh> obj = ReadNamed(
       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no head\nusemtl steel\nf 1 3 2\no grip\nf 1 2 4\n"
