@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <iostream>
 #include <memory>
@@ -28,6 +29,7 @@
 #include "client_sdk/cli/options/unknown_word.h"
 #include "client_sdk/cli/options/value_options.h"
 #include "client_sdk/cli/output/output.h"
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/striker_catalogue.h"
 
 namespace carillon::cli {
@@ -332,6 +334,19 @@ std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
   return absl::StrCat(what, "\nRun with --help for more information.");
 }
 
+/// Prints what is wrong with the command line to stderr, and with --json its first line to stdout as
+/// an error. Returns the exit code.
+int ReportMistake(const std::string& what, int argc, char** argv) {
+  std::cerr << "carillon: " << what << '\n';
+  const auto is_json = [](absl::string_view word) { return word == "--json"; };
+  if (std::any_of(argv, argv + argc, is_json)) {
+    std::cout << ErrorJson(Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+                                   what.substr(0, what.find('\n'))))
+              << '\n';
+  }
+  return kUsage;
+}
+
 /// Returns the exit code of a command that ended with `code`, once its output is written.
 int Finish(int code) { return code == kDone ? Report(FlushOutput()) : code; }
 
@@ -347,13 +362,13 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const std::string unknown = UnknownWord(app, argc, argv);
     if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
-    std::cerr << "carillon: " << (unknown.empty() ? MistakeText(app, error) : unknown) << '\n';
-    return kUsage;
+    return ReportMistake(unknown.empty() ? MistakeText(app, error) : unknown, argc, argv);
   }
   if (!IsServerAddress(program.server)) {
-    std::cerr << "carillon: --server or $CARILLON_SERVER: \"" << program.server
-              << "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535\n";
-    return kUsage;
+    return ReportMistake(
+        absl::StrCat("--server or $CARILLON_SERVER: \"", program.server,
+                     "\" must be unix:PATH, or HOST:PORT with a port from 1 to 65535"),
+        argc, argv);
   }
   return Finish(Report(program.command(), program.json));
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the command line answers to mistakes, and when its output is lost."""
 
+import json
 import os
 import subprocess
 import unittest
@@ -109,8 +110,14 @@ class WrongValuesTest(unittest.TestCase):
                                 (("--json", "render", "x.contacts", "--out", "-"), "--json: stdout has the sound"),
                                 (("--server", "127.0.0.1:99999", "status"), "a port from 1 to 65535")):
             done = carillon(*words)
-            self.assertEqual((done.returncode, done.stdout), (2, ""), words)
+            self.assertEqual(done.returncode, 2, words)
             self.assertIn(expected, done.stderr)
+            if "--json" not in words:
+                self.assertEqual(done.stdout, "", words)
+                done = carillon("--json", *words)
+            error = json.loads(done.stdout)["error"]
+            self.assertEqual(error["reason"], "INVALID_SETTINGS")
+            self.assertIn(error["message"].split("\n")[0], done.stderr)
         asked = carillon("status", env={**os.environ, "CARILLON_SERVER": "localhost"})
         self.assertIn('"localhost" must be unix:PATH, or HOST:PORT', asked.stderr)
 
