@@ -16,9 +16,13 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/gltf_uri.h"
+#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon {
@@ -93,8 +97,9 @@ std::vector<std::string*> ExternalUris(Struct& document) {
   return uris;
 }
 
-bool ReadDocument(const std::string& gltf, Struct& document) {
-  return google::protobuf::util::JsonStringToMessage(gltf, &document).ok();
+bool ReadDocument(absl::string_view gltf, Struct& document) {
+  absl::ConsumePrefix(&gltf, "\xEF\xBB\xBF");  // a byte order mark
+  return google::protobuf::util::JsonStringToMessage({gltf.data(), gltf.size()}, &document).ok();
 }
 
 absl::StatusOr<std::string> ReadBuffer(const std::filesystem::path& document,
@@ -131,10 +136,90 @@ absl::StatusOr<std::string> ReadGltf(const std::filesystem::path& path) {
   return bytes;
 }
 
+/// The file of which a line of Abaqus' input has the content, and what else the line says.
+struct InpInput {
+  std::string file;
+  std::string line;
+};
+
+/// Reads "*INCLUDE, INPUT=FILE" and "*NODE, INPUT=FILE, ...". Returns nothing for other lines.
+std::optional<InpInput> InputOf(absl::string_view line) {
+  line = absl::StripAsciiWhitespace(line);
+  if (!absl::ConsumePrefix(&line, "*") || absl::StartsWith(line, "*")) return std::nullopt;
+  std::vector<absl::string_view> fields = absl::StrSplit(line, ',');
+  const absl::string_view keyword = absl::StripAsciiWhitespace(fields[0]);
+  const auto is_keyword = [&](const char* name) { return absl::EqualsIgnoreCase(keyword, name); };
+  const bool is_include = is_keyword("INCLUDE");
+  if (!is_include && !is_keyword("NODE") && !is_keyword("ELEMENT") && !is_keyword("NSET") &&
+      !is_keyword("ELSET")) {
+    return std::nullopt;
+  }
+  for (auto field = fields.begin() + 1; field != fields.end(); ++field) {
+    const std::vector<absl::string_view> sides = absl::StrSplit(*field, absl::MaxSplits('=', 1));
+    if (sides.size() < 2) continue;
+    if (!absl::EqualsIgnoreCase(absl::StripAsciiWhitespace(sides[0]), "INPUT")) continue;
+    absl::string_view name = absl::StripAsciiWhitespace(sides[1]);
+    if (name.size() > 1 && absl::StartsWith(name, "\"") && absl::EndsWith(name, "\"")) {
+      name = name.substr(1, name.size() - 2);
+    }
+    fields.erase(field);
+    const std::string rest = absl::StrCat("*", absl::StrJoin(fields, ","), "\n");
+    return InpInput{absl::StrReplaceAll(name, {{"\\", "/"}}), is_include ? "" : rest};
+  }
+  return std::nullopt;
+}
+
+/// Adds the lines of `bytes`, a file that `deck` includes or `deck` itself, and those of the files
+/// that it includes, whose names count from the folder of `deck`. A comment "**@ LINE FILE" says
+/// from where the next line is.
+absl::Status AddInp(const std::filesystem::path& deck, const std::string& name, int depth,
+                    const std::string& bytes, std::string& joined) {
+  constexpr int kMostDepth = 16;
+  int number = 0;
+  for (const absl::string_view line : absl::StrSplit(bytes, '\n')) {
+    ++number;
+    const std::optional<InpInput> input = InputOf(line);
+    if (!input) {
+      absl::StrAppend(&joined, line, "\n");
+      continue;
+    }
+    const std::filesystem::path path(input->file);
+    const bool is_outside =
+        path.is_absolute() || std::ranges::find(path, std::filesystem::path("..")) != path.end();
+    if (is_outside || depth == kMostDepth) {
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+          absl::StrCat("line ", number, " of ", name.empty() ? deck.string() : QuotedText(name),
+                       " includes ", QuotedText(input->file),
+                       is_outside ? ", which is not in the folder of the file: put it "
+                                    "there, and name it without its folder"
+                                  : ": the files include each other without an end"));
+    }
+    ASSIGN_OR_RETURN(const std::string content, ReadOne(deck.parent_path() / path));
+    absl::StrAppend(&joined, input->line, "**@ 1 ", input->file, "\n");
+    RETURN_IF_ERROR(AddInp(deck, input->file, depth + 1, content, joined));
+    absl::StrAppend(&joined, "**@ ", number + 1, " ", name, "\n");
+    if (joined.size() > kMostMeshBytes) return TooLarge(deck);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> ReadInp(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(std::string bytes, ReadOne(path));
+  const std::vector<absl::string_view> lines = absl::StrSplit(bytes, '\n');
+  if (std::ranges::none_of(lines, [](auto line) { return InputOf(line).has_value(); })) {
+    return bytes;
+  }
+  std::string joined;
+  RETURN_IF_ERROR(AddInp(path, "", 0, bytes, joined));
+  return joined;
+}
+
 absl::StatusOr<std::string> ReadAnyFormat(const std::filesystem::path& path,
                                           const std::string& format) {
   const std::filesystem::path suffix = path.extension();
   if (format == "node" && (suffix == ".node" || suffix == ".ele")) return ReadTetgen(path);
+  if (format == "inp") return ReadInp(path);
   const bool has_buffers = format == "gltf" && absl::EqualsIgnoreCase(suffix.string(), ".gltf");
   return has_buffers ? ReadGltf(path) : ReadOne(path);
 }

@@ -18,10 +18,12 @@ std::string MeshFormatOf(const std::string& path);
 ///     them `path` names, unless one file contains both already.
 ///   - For a file *.gltf it returns the document with the data of its buffers in it. Their files
 ///     must be in the folder of `path` or below it.
+///   - For the format "inp" it returns the file with those that it includes (*INCLUDE, and *NODE,
+///     *ELEMENT, *NSET and *ELSET with INPUT=), which must be in the folder of `path` or below it.
 ///   - Other files it returns as they are.
 ///
 /// Errors: NotFound (FILE_NOT_FOUND), ResourceExhausted (MESH_TOO_LARGE: above 256 MiB),
-/// InvalidArgument (MESH_EMPTY; MESH_UNREADABLE: a buffer's file is elsewhere).
+/// InvalidArgument (MESH_EMPTY; MESH_UNREADABLE: such a file is elsewhere).
 absl::StatusOr<std::string> ReadMeshFile(const std::string& path, const std::string& format);
 
 }  // namespace carillon

@@ -40,21 +40,22 @@ function makeObj({ vertices, triangles }) {
 }
 
 /**
- * Returns the file of a glTF's buffer. A file elsewhere is refused, because an untrusted document could have any file
- * of the user sent to the daemon.
+ * Returns a file with data of another. A file elsewhere is refused, because an untrusted document could have any file of
+ * the user sent to the daemon.
  */
-function besideGltf(file, uri) {
-  let name = uri;
-  try {
-    name = decodeURIComponent(uri);
-  } catch {
-    // An address with a stray % is the name of a file as it is.
-  }
-  if (path.isAbsolute(name) || name.split(/[\\/]/).includes('..') || uri.includes('://')) {
-    throw new CarillonError('MESH_UNREADABLE', `${file} keeps its data in "${uri}", which is not in its folder: put it ` +
-      'there, or export the body as GLB');
+function beside(file, name) {
+  if (path.isAbsolute(name) || name.split(/[\\/]/).includes('..') || name.includes('://')) {
+    throw new CarillonError('MESH_UNREADABLE', `${file} keeps data in "${name}", which is not in its folder: put it there`);
   }
   return path.join(path.dirname(file), name);
+}
+
+function unescapeUri(uri) {
+  try {
+    return decodeURIComponent(uri);
+  } catch {
+    return uri; // An address with a stray % is the name of a file as it is.
+  }
 }
 
 /**
@@ -64,7 +65,7 @@ function besideGltf(file, uri) {
 async function withBuffers(file, data) {
   let document;
   try {
-    document = JSON.parse(data.toString());
+    document = JSON.parse(data.toString().replace(/^\uFEFF/, ''));
   } catch {
     return data;
   }
@@ -72,10 +73,34 @@ async function withBuffers(file, data) {
   const external = Object.values((document && document.buffers) || {})
     .filter((buffer) => buffer && typeof buffer.uri === 'string' && !/^data:/i.test(buffer.uri));
   for (const buffer of external) {
-    const content = await fs.readFile(besideGltf(file, buffer.uri));
+    const content = await fs.readFile(beside(file, unescapeUri(buffer.uri)));
     buffer.uri = `data:application/octet-stream;base64,${content.toString('base64')}`;
   }
   return external.length ? Buffer.from(JSON.stringify(document)) : data;
+}
+
+const INPUT = new RegExp('^[ \\t]*\\*(?:(INCLUDE)|(?:NODE|ELEMENT|NSET|ELSET))[ \\t]*(?:,[^,\\n]*)*?' +
+  '(,[ \\t]*INPUT[ \\t]*=[ \\t]*"?([^",\\r\\n]+?)"?[ \\t]*(?=[,\\r\\n]|(?![^])))[^\\n]*\\n?', 'gim');
+
+/**
+ * Returns the lines of an .inp file, or of the file `name` that it includes, with those of the files that they include. A
+ * comment "**@ LINE FILE" says from where the next line is.
+ */
+async function withIncludes(file, data, name = '', depth = 0) {
+  const text = data.toString('latin1');
+  let joined = '';
+  let end = 0;
+  for (const found of text.matchAll(INPUT)) {
+    const other = found[3].replaceAll('\\', '/');
+    if (depth === 16) throw new CarillonError('MESH_UNREADABLE', `${file}: ${name} includes ${other} without an end`);
+    const content = await withIncludes(file, await fs.readFile(beside(file, other)), other, depth + 1);
+    const after = found.index + found[0].length;
+    const line = text.slice(0, after).split('\n').length;
+    joined += text.slice(end, found.index) + (found[1] ? '' : `${found[0].replace(found[2], '').trimEnd()}\n`) +
+      `**@ 1 ${other}\n${content.toString('latin1').trimEnd()}\n**@ ${line} ${name}\n`;
+    end = after;
+  }
+  return end ? Buffer.from(joined + text.slice(end), 'latin1') : data;
 }
 
 /** Reads a mesh file, or makes one of { vertices, triangles }. Returns its bytes, its format and a label. */
@@ -86,7 +111,8 @@ async function toMeshFile(mesh) {
   const { ext, name } = path.parse(mesh);
   const format = ext.slice(1).toLowerCase();
   const data = await fs.readFile(mesh);
-  return { data: format === 'gltf' ? await withBuffers(mesh, data) : data, format, label: name };
+  const whole = { gltf: withBuffers, inp: withIncludes }[format];
+  return { data: whole ? await whole(mesh, data) : data, format, label: name };
 }
 
 module.exports = { toMeshFile };

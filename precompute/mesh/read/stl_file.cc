@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,11 +29,14 @@ absl::Status StlUnreadable(absl::string_view what) {
                               ". Name its right format, or export it again"));
 }
 
-/// The number of triangles that a binary solid says it has.
-uint32_t TriangleCountOf(std::string_view solid) {
+/// The number of triangles that a binary solid says it has. Programs that write while they compute
+/// leave 0 or the greatest number there; then all that follows are triangles.
+size_t TriangleCountOf(std::string_view solid) {
   uint32_t count = 0;
   std::memcpy(&count, solid.data() + kStlTitle, sizeof count);
-  return count;
+  const size_t byte_count = solid.size() - kStlHeader;
+  const bool is_unknown = count == 0 || count == std::numeric_limits<uint32_t>::max();
+  return is_unknown && byte_count % kStlTriangle == 0 ? byte_count / kStlTriangle : count;
 }
 
 /// Titles of binary files may begin with "solid", too, but a text has no zero bytes.
@@ -41,7 +45,7 @@ bool IsStlText(std::string_view bytes) {
   const std::string first = absl::AsciiStrToLower(std::string(bytes.substr(begin, 5)));
   if (first != "solid") return false;
   if (bytes.size() >= kStlHeader &&
-      bytes.size() == kStlHeader + kStlTriangle * size_t{TriangleCountOf(bytes)}) {
+      bytes.size() == kStlHeader + kStlTriangle * TriangleCountOf(bytes)) {
     return false;
   }
   return bytes.substr(0, 512).find('\0') == std::string_view::npos;

@@ -3,11 +3,15 @@
 'use strict';
 
 const assert = require('node:assert/strict');
+const fs = require('node:fs');
+const os = require('node:os');
+const path = require('node:path');
 const { test } = require('node:test');
 const { inspect } = require('node:util');
 const carillon = require('carillon');
 const { Metadata } = require('@grpc/grpc-js');
 const { fromCall, fromInfo } = require('carillon/lib/errors');
+const { toMeshFile } = require('carillon/lib/meshes');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
 const { warnOfContacts, warnOfLabel, warnOfUnit } = require('carillon/lib/warnings');
@@ -349,4 +353,25 @@ test('all that a user meets is shown in one short line', () => {
     [trace, '<Trace: 1 object, 1 step, to 0.5 s>'],
     [new carillon.Sound(new Float32Array(4800), 48000, 1), '<Sound: 0.1 s, 48000 Hz, 1 channel, peak 0>'],
   ]) assert.equal(inspect(item), expected);
+});
+
+test('an input of Abaqus comes with the files in its folder that it includes', async () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'carillon-'));
+  const read = async (text) => {
+    fs.writeFileSync(path.join(folder, 'bar.inp'), text);
+    return (await toMeshFile(path.join(folder, 'bar.inp'))).data.toString();
+  };
+  try {
+    fs.mkdirSync(path.join(folder, 'data'));
+    fs.writeFileSync(path.join(folder, 'data/corners.inc'), '1, 0, 0, 0\n*Include, input="data/more.inc"\n');
+    fs.writeFileSync(path.join(folder, 'data/more.inc'), '2, 1, 0, 0');
+    assert.equal(await read('*NODE, INPUT = data\\corners.inc, NSET=all\r\n** *INCLUDE, INPUT=no\n*STEP\n'),
+      '*NODE, NSET=all\n**@ 1 data/corners.inc\n1, 0, 0, 0\n**@ 1 data/more.inc\n2, 1, 0, 0\n' +
+      '**@ 3 data/corners.inc\n**@ 2 \n** *INCLUDE, INPUT=no\n*STEP\n');
+    for (const name of ['../bar.inc', '/etc/passwd', 'bar.inp']) {
+      await assert.rejects(read(`*INCLUDE, INPUT=${name}\n`), (error) => error.message.includes(name));
+    }
+  } finally {
+    fs.rmSync(folder, { recursive: true });
+  }
 });

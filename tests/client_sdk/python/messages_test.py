@@ -5,7 +5,9 @@
 import functools
 import inspect
 import os
+import pathlib
 import pickle
+import tempfile
 import types
 import unittest
 import warnings
@@ -230,6 +232,36 @@ class AioTest(unittest.TestCase):
                                      isinstance(member, (carillon.faces.call, carillon.faces.items)))
                     like = getattr(kind, name)
                     self.assertTrue(inspect.iscoroutinefunction(like) or inspect.isasyncgenfunction(like))
+
+
+# What proto/cpp/mesh_file.cc makes of the same files, but for empty lines.
+JOINED = (b"*NODE, NSET=all\n**@ 1 data/corners.inc\n1, 0, 0, 0\n**@ 1 data/more.inc\n2, 1, 0, 0\n"
+          b"**@ 3 data/corners.inc\n**@ 2 \n** *INCLUDE, INPUT=no\n*STEP\n")
+
+
+class MeshFilesTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        (self.folder / "data").mkdir()
+
+    def read(self, text):
+        (self.folder / "bar.inp").write_bytes(text)
+        return carillon.meshes.read_mesh(self.folder / "bar.inp").data
+
+    def test_an_input_of_abaqus_comes_with_the_files_that_it_includes(self):
+        (self.folder / "data/corners.inc").write_text('1, 0, 0, 0\n*Include, input="data/more.inc"\n')
+        (self.folder / "data/more.inc").write_text("2, 1, 0, 0")
+        self.assertEqual(self.read(b"*NODE, INPUT = data\\corners.inc, NSET=all\r\n** *INCLUDE, INPUT=no\n*STEP\n"),
+                         JOINED)
+
+    def test_an_included_file_must_be_there_in_the_folder_and_not_include_itself(self):
+        for name in ("../bar.inc", "/etc/passwd", "bar.inp"):
+            with self.assertRaisesRegex(carillon.CarillonError, name):
+                self.read(f"*INCLUDE, INPUT={name}\n".encode())
+        with self.assertRaises(FileNotFoundError):
+            self.read(b"*INCLUDE, INPUT=gone.inc\n")
 
 
 if __name__ == "__main__":

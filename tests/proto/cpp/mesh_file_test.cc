@@ -84,6 +84,34 @@ TEST_F(MeshFile, OnlyAFileNamedGltfBringsOthers) {
   EXPECT_EQ(*ReadMeshFile(Write("body.gltf", document), "obj"), document);
 }
 
+TEST_F(MeshFile, AByteOrderMarkDoesNotHideTheBuffersOfAGltf) {
+  Write("body.bin", "abc");
+  EXPECT_THAT(ReadGltf("\xEF\xBB\xBF" + Gltf("body.bin")), HasSubstr(kAbc));
+}
+
+TEST_F(MeshFile, AnInputOfAbaqusComesWithTheFilesThatItIncludes) {
+  Write("data/corners.inc", "1, 0, 0, 0\n*Include, input=\"data/more.inc\"\n");
+  Write("data/more.inc", "2, 1, 0, 0");
+  const std::string deck =
+      "*NODE, INPUT = data\\corners.inc, NSET=all\r\n** *INCLUDE, INPUT=no\n*STEP\n";
+  EXPECT_EQ(*ReadMeshFile(Write("bar.inp", deck), "inp"),
+            "*NODE, NSET=all\n**@ 1 data/corners.inc\n1, 0, 0, 0\n**@ 1 data/more.inc\n2, 1, 0, 0\n"
+            "**@ 3 data/corners.inc\n\n**@ 2 \n** *INCLUDE, INPUT=no\n*STEP\n\n");
+}
+
+TEST_F(MeshFile, AnIncludedFileMustBeThereInTheFolderAndNotIncludeItself) {
+  const auto refusal = [&](const std::string& deck) {
+    return ReadMeshFile(Write("bar.inp", deck), "inp").status().ToString();
+  };
+  EXPECT_THAT(refusal("\n*INCLUDE, INPUT=../bar.inc\n"),
+              AllOf(HasSubstr("MESH_UNREADABLE: "), HasSubstr("line 2"), HasSubstr("../bar.inc")));
+  EXPECT_THAT(refusal("*INCLUDE, INPUT=/etc/passwd\n"), HasSubstr("MESH_UNREADABLE: "));
+  EXPECT_THAT(refusal("*INCLUDE, INPUT=gone.inc\n"),
+              AllOf(HasSubstr("FILE_NOT_FOUND: "), HasSubstr("gone.inc")));
+  EXPECT_THAT(refusal("*INCLUDE, INPUT=bar.inp\n"),
+              AllOf(HasSubstr("MESH_UNREADABLE: "), HasSubstr("without an end")));
+}
+
 TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOne) {
   Write("body.node", "nodes");
   const std::string elements = Write("body.ele", "elements\n");

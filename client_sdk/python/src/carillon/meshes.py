@@ -8,6 +8,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import re
 import urllib.parse
 from typing import Any
 
@@ -26,10 +27,10 @@ class MeshFile:
 
 
 def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
-    """Reads a mesh file. The two files that TetGen writes become one, and a .gltf file gets the data of its buffers,
-    whose files must be in its folder or below it.
+    """Reads a mesh file. The two files that TetGen writes become one, a .gltf file gets the data of its buffers, and an
+    .inp file those that it includes. Their files must be in its folder or below it.
 
-    Raises OSError where a file cannot be read, and CarillonError (MESH_UNREADABLE) where a buffer's file is elsewhere.
+    Raises OSError where a file cannot be read, and CarillonError (MESH_UNREADABLE) where such a file is elsewhere.
     """
     file = pathlib.Path(path)
     mesh_format = file.suffix.lstrip(".").lower()
@@ -37,14 +38,36 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         nodes = file.with_suffix(".node").read_bytes()
         return MeshFile(nodes.rstrip(b"\n") + b"\n" + file.with_suffix(".ele").read_bytes(), "node", file.stem)
     data = file.read_bytes()
-    return MeshFile(_with_buffers(file, data) if mesh_format == "gltf" else data, mesh_format, file.stem)
+    whole = {"gltf": _with_buffers, "inp": _with_includes}.get(mesh_format, lambda _, content: content)
+    return MeshFile(whole(file, data), mesh_format, file.stem)
+
+
+_INPUT = re.compile(rb"""^[ \t]*\*(?:(INCLUDE)|(?:NODE|ELEMENT|NSET|ELSET))[ \t]*(?:,[^,\n]*)*?
+                        (,[ \t]*INPUT[ \t]*=[ \t]*"?([^",\r\n]+?)"?[ \t]*(?=[,\r\n]|\Z))[^\n]*\n?""", re.I | re.M | re.X)
+
+
+def _with_includes(file: pathlib.Path, data: bytes, name: str = "", depth: int = 0) -> bytes:
+    """The lines of an .inp file, or of the file `name` that it includes, with those of the files that they include. A
+    comment "**@ LINE FILE" says from where the next line is."""
+    parts, end = [], 0
+    for found in _INPUT.finditer(data):
+        other = found[3].decode(errors="replace").replace("\\", "/")
+        if depth == 16:
+            raise CarillonError("MESH_UNREADABLE", f"{file}: {name} includes {other} without an end")
+        rest = b"" if found[1] else found[0].replace(found[2], b"").rstrip() + b"\n"
+        content = _with_includes(file, _beside(file, other).read_bytes(), other, depth + 1)
+        line = data.count(b"\n", 0, found.end()) + 1
+        parts += [data[end:found.start()], rest, f"**@ 1 {other}\n".encode(), content.rstrip(b"\n"),
+                  f"\n**@ {line} {name}\n".encode()]
+        end = found.end()
+    return b"".join([*parts, data[end:]])
 
 
 def _with_buffers(file: pathlib.Path, data: bytes) -> bytes:
     """A glTF document with the data of its buffers in it. A text that is no such document stays as it is, so that the
     daemon says what is wrong with it."""
     try:
-        document = json.loads(data)
+        document = json.loads(data.removeprefix(b"\xef\xbb\xbf"))  # a byte order mark
         buffers = document.get("buffers", [])
     except (ValueError, RecursionError, AttributeError):
         return data
@@ -53,20 +76,19 @@ def _with_buffers(file: pathlib.Path, data: bytes) -> bytes:
     for buffer in buffers.values() if isinstance(buffers, dict) else buffers if isinstance(buffers, list) else []:
         uri = buffer.get("uri") if isinstance(buffer, dict) else None
         if isinstance(uri, str) and not uri.lower().startswith("data:"):
-            content = base64.b64encode(_beside(file, uri).read_bytes()).decode()
+            content = base64.b64encode(_beside(file, urllib.parse.unquote(uri)).read_bytes()).decode()
             buffer["uri"] = f"data:application/octet-stream;base64,{content}"
             changed = True
     return json.dumps(document).encode() if changed else data
 
 
-def _beside(file: pathlib.Path, uri: str) -> pathlib.Path:
-    """The file of a buffer. A file elsewhere is refused, because an untrusted document could have any file of the
-    user sent to the daemon."""
-    name = pathlib.PurePath(urllib.parse.unquote(uri))
-    if name.is_absolute() or ".." in name.parts or "://" in uri:
-        raise CarillonError("MESH_UNREADABLE", f'{file} keeps its data in "{uri}", which is not in its folder: put it '
-                            "there, or export the body as GLB")
-    return file.parent / name
+def _beside(file: pathlib.Path, name: str) -> pathlib.Path:
+    """A file with data of another. A file elsewhere is refused, because an untrusted document could have any file of
+    the user sent to the daemon."""
+    path = pathlib.PurePath(name)
+    if path.is_absolute() or ".." in path.parts or "://" in name:
+        raise CarillonError("MESH_UNREADABLE", f'{file} keeps data in "{name}", which is not in its folder: put it there')
+    return file.parent / path
 
 
 def make_obj(vertices: Any, triangles: Any, label: str = "") -> MeshFile:

@@ -28,8 +28,7 @@ namespace carillon::precompute {
 namespace {
 
 /// Keywords that make, move, add or take away parts of the body in ways that are not read.
-constexpr std::string_view kInpRefused[] = {"INCLUDE",
-                                            "NGEN",
+constexpr std::string_view kInpRefused[] = {"NGEN",
                                             "NFILL",
                                             "NCOPY",
                                             "NMAP",
@@ -56,7 +55,11 @@ class InpParser {
     std::string_view line;
     while (lines_.Next(line)) {
       const size_t begin = line.find_first_not_of(" \t");
-      if (begin == std::string_view::npos || line.substr(begin).starts_with("**")) continue;
+      if (begin == std::string_view::npos) continue;
+      if (line.substr(begin).starts_with("**")) {
+        TakeComment(line);
+        continue;
+      }
       RETURN_IF_ERROR(line[begin] == '*' ? Begin(line.substr(begin)) : Take(line.substr(begin)));
     }
     RETURN_IF_ERROR(EndBlock());
@@ -66,6 +69,15 @@ class InpParser {
   }
 
  private:
+  /// ReadMeshFile puts "**@ LINE FILE" before lines of another file.
+  void TakeComment(std::string_view line) {
+    if (!line.starts_with("**@ ")) return;
+    line.remove_prefix(4);
+    const size_t blank = std::min(line.find(' '), line.size());
+    const auto number = ToNumber<int>(line.substr(0, blank));
+    if (number) lines_.GoOnAt(*number, line.substr(std::min(blank + 1, line.size())));
+  }
+
   /// Begins the block of a keyword line, which goes on in the next line after a comma at its end.
   absl::Status Begin(std::string_view line) {
     RETURN_IF_ERROR(EndBlock());
@@ -78,11 +90,15 @@ class InpParser {
     if (std::ranges::find(kInpRefused, keyword_.name) != std::end(kInpRefused)) {
       return NotRead(absl::StrCat("*", keyword_.name));
     }
-    for (const char* parameter : {"INPUT", "FILE"}) {
-      const bool is_mesh = keyword_.name == "NODE" || keyword_.name == "ELEMENT" ||
-                           keyword_.name == "NSET" || keyword_.name == "ELSET";
-      if (is_mesh && keyword_.Has(parameter)) return NotRead(absl::StrCat(parameter, "="));
+    const bool is_mesh = keyword_.name == "NODE" || keyword_.name == "ELEMENT" ||
+                         keyword_.name == "NSET" || keyword_.name == "ELSET";
+    if (keyword_.name == "INCLUDE" || (is_mesh && keyword_.Has("INPUT"))) {
+      return lines_.Unreadable(absl::StrCat(
+          "the file ", QuotedText(keyword_.Of("INPUT")),
+          " belongs here, and did not come with this one: give Carillon's programs or clients the "
+          "path of the .inp file, which brings the files in its folder"));
     }
+    if (is_mesh && keyword_.Has("FILE")) return NotRead("FILE=");
     WarnOfCondition();
     if (keyword_.name == "PART" || keyword_.name == "INSTANCE" || keyword_.name == "ASSEMBLY" ||
         keyword_.name.starts_with("END ")) {
@@ -104,8 +120,8 @@ class InpParser {
 
   void WarnOfCondition() {
     if (std::ranges::find(kInpConditions, keyword_.name) == std::end(kInpConditions)) return;
-    const std::string warning = absl::StrCat("*", keyword_.name, " of the file (line ",
-                                             lines_.number(), ") is not used; --fix fixes a body");
+    const std::string warning = absl::StrCat("*", keyword_.name, " of the file (", lines_.place(),
+                                             ") is not used; --fix fixes a body");
     if (warned_.insert(keyword_.name).second) warnings_.push_back(warning);
   }
 
@@ -145,7 +161,7 @@ class InpParser {
     kind_ = FindInpKind(type);
     if (kind_) return absl::OkStatus();
     return UnsupportedElements(absl::StrCat("elements of type ", EscapedText(type.substr(0, 60)),
-                                            " (line ", lines_.number(), ")"));
+                                            " (", lines_.place(), ")"));
   }
 
   absl::Status TakeSection() {
@@ -162,6 +178,7 @@ class InpParser {
     if (keyword_.name == "ELEMENT" && kind_) return TakeElement(fields);
     if (keyword_.name == "NSET") return TakeSet(fields, keyword_.Of("NSET"), true);
     if (keyword_.name == "ELSET") return TakeSet(fields, keyword_.Of("ELSET"), false);
+    if (keyword_.name == "SURFACE" && !fields.empty()) return TakeSurface(fields);
     if (keyword_.name == "INSTANCE") return TakePlace(fields);
     if (keyword_.name == "SYSTEM") return TakeSystem(fields);
     return absl::OkStatus();
@@ -245,7 +262,7 @@ class InpParser {
     const std::vector<int64_t> element = std::exchange(pending_, {});
     const int64_t number = element[0];
     if (!keyword_.Of("ELSET").empty()) {
-      scope_->SetNamed(keyword_.Of("ELSET")).elements.push_back(number);
+      scope_->SetNamed(keyword_.Of("ELSET")).elements.push_back({number});
     }
     if (!scope_->element_at.try_emplace(number, scope_->elements.size()).second) {
       return lines_.Unreadable(absl::StrCat("element ", number, " is there twice"));
@@ -270,6 +287,27 @@ class InpParser {
     return absl::OkStatus();
   }
 
+  /// "set or node" of a surface of nodes, and "set or element, S2" of a surface of faces. A surface
+  /// is a group, as a set is.
+  absl::Status TakeSurface(const std::vector<std::string_view>& fields) {
+    const std::string name = keyword_.Of("NAME");
+    if (InpName(keyword_.Of("TYPE")) == "NODE") return TakeSet({fields[0]}, name, true);
+    const std::string face = fields.size() > 1 ? InpName(fields[1]) : "";
+    const bool is_numbered = face.size() == 2 && face[0] == 'S' && face[1] >= '1' && face[1] <= '4';
+    if (!is_numbered && face != "SPOS" && face != "SNEG") {
+      if (warned_.insert("SURFACE " + name).second) {
+        warnings_.push_back(absl::StrCat(
+            lines_.place(), ": the surface ", QuotedText(name),
+            " is no group, because a row does not name its faces (S1 to S4, SPOS or SNEG)"));
+      }
+      return absl::OkStatus();
+    }
+    face_ = is_numbered ? face[1] - '0' : 0;
+    const absl::Status status = TakeSet({fields[0]}, name, false);
+    face_ = 0;
+    return status;
+  }
+
   absl::Status Generate(const std::vector<std::string_view>& fields, const std::string& name,
                         bool of_nodes) {
     std::array<int64_t, 3> range = {0, 0, 1};
@@ -287,8 +325,7 @@ class InpParser {
   void AddMember(const std::string& name, int64_t number, bool of_nodes) {
     if (keyword_.Has("INSTANCE"))
       return AddMemberOf(keyword_.Of("INSTANCE"), name, number, of_nodes);
-    InpScope::Set& set = scope_->SetNamed(name);
-    (of_nodes ? set.nodes : set.elements).push_back(number);
+    Put(number, of_nodes, scope_->SetNamed(name));
   }
 
   void AddMemberOf(const std::string& instance, const std::string& name, int64_t number,
@@ -301,7 +338,24 @@ class InpParser {
     if (set == assembly_sets_.end()) {
       set = assembly_sets_.insert(set, InpAssemblySet{name, instance, {}, {}});
     }
-    (of_nodes ? set->nodes : set->elements).push_back(number);
+    Put(number, of_nodes, *set);
+  }
+
+  template <typename Set>
+  void Put(int64_t number, bool of_nodes, Set& set) const {
+    if (of_nodes) {
+      set.nodes.push_back(number);
+    } else {
+      set.elements.push_back({number, face_});
+    }
+  }
+
+  static std::vector<int64_t> NumbersOf(const auto& set, bool of_nodes) {
+    if (of_nodes) return set.nodes;
+    std::vector<int64_t> numbers;
+    numbers.reserve(set.elements.size());
+    for (const InpMember& member : set.elements) numbers.push_back(member.element);
+    return numbers;
   }
 
   /// Adds the members of another set, or in an assembly "INSTANCE.NUMBER" or "INSTANCE.SET".
@@ -320,20 +374,30 @@ class InpParser {
       if (scope != nullptr && number) return AddMemberOf(instance, name, *number, of_nodes);
     }
     const InpScope::Set* found = scope == nullptr ? nullptr : scope->FindSet(rest);
-    if (found == nullptr) {
-      warnings_.push_back(absl::StrCat("line ", lines_.number(), ": the set ", QuotedText(other),
-                                       " is not there, and was left out of ", QuotedText(name)));
-      return;
-    }
-    const InpScope::Set members = *found;
+    if (found == nullptr) return AddAssemblySets(name, other, of_nodes);
     if (instance.empty() && absl::EqualsIgnoreCase(name, other)) return;
-    for (const int64_t n : of_nodes ? members.nodes : members.elements) {
+    for (const int64_t n : NumbersOf(*found, of_nodes)) {
       if (instance.empty()) {
         AddMember(name, n, of_nodes);
       } else {
         AddMemberOf(instance, name, n, of_nodes);
       }
     }
+  }
+
+  /// Adds the members of a set of the assembly, which may be in several instances.
+  void AddAssemblySets(const std::string& name, const std::string& other, bool of_nodes) {
+    bool is_found = false;
+    for (const InpAssemblySet& set : std::vector<InpAssemblySet>(assembly_sets_)) {
+      if (!absl::EqualsIgnoreCase(set.name, other)) continue;
+      is_found = true;
+      for (const int64_t n : NumbersOf(set, of_nodes)) {
+        AddMemberOf(set.instance, name, n, of_nodes);
+      }
+    }
+    if (is_found) return;
+    warnings_.push_back(absl::StrCat(lines_.place(), ": the set ", QuotedText(other),
+                                     " is not there, and was left out of ", QuotedText(name)));
   }
 
   /// The instances; where there are none, the only part, or what stands outside all parts.
@@ -361,6 +425,7 @@ class InpParser {
   std::vector<int64_t> pending_;  // the number and the first nodes of an element
   bool is_cylindrical_ = false;   // how the nodes are given that are being read
   InpSystem system_;              // and in which system
+  int face_ = 0;                  // the face of the elements of a surface that is being read
   std::set<std::string> warned_;
   std::vector<std::string> warnings_;
 };

@@ -2,6 +2,7 @@
 #include "precompute/mesh/read/elements/inp_model.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <span>
@@ -19,6 +20,10 @@ namespace {
 
 /// Numbers of nodes of several bodies are this far apart.
 constexpr int64_t kBodyStride = int64_t{1} << 40;
+
+/// The corners of the faces S1 to S4 of a tetrahedron.
+constexpr std::array<std::array<size_t, 3>, 4> kInpFaces = {
+    {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}};
 
 /// Adds the bodies to a file one after the other.
 class BodyJoiner {
@@ -117,7 +122,7 @@ class BodyJoiner {
   }
 
   void AddMembers(size_t b, const std::string& name, const std::vector<int64_t>& nodes,
-                  const std::vector<int64_t>& elements) {
+                  const std::vector<InpMember>& elements) {
     ElementFile::Group& group = file_.Named(name);
     const auto add = [&](std::span<const int64_t> corners) {
       auto& simplex = group.simplices.emplace_back();
@@ -127,11 +132,17 @@ class BodyJoiner {
     };
     const InpScope& scope = bodies_[b].scope;
     for (const int64_t number : nodes) add(std::span(&number, 1));
-    for (const int64_t number : elements) {
+    for (const auto& [number, face] : elements) {
       const auto found = scope.element_at.find(number);
       if (found == scope.element_at.end()) continue;
       const InpScope::Element& element = scope.elements[found->second];
-      add(NodesOf(b, element).first(element.kind.corner_count));
+      const std::span<const int64_t> nodes_of_one = NodesOf(b, element);
+      if (face > 0 && element.kind.dimension == 3) {
+        const auto& [i, j, k] = kInpFaces[static_cast<size_t>(face) - 1];
+        add(std::array{nodes_of_one[i], nodes_of_one[j], nodes_of_one[k]});
+        continue;
+      }
+      add(nodes_of_one.first(element.kind.corner_count));
       const Placed& placed = placed_[b][found->second];
       for (size_t t = placed.first_triangle; t < placed.end_triangle; ++t) {
         group.triangles.push_back(static_cast<int32_t>(t));
@@ -175,8 +186,8 @@ std::vector<MeshRegion> InpScope::SectionsOfElements() const {
     const auto set = std::ranges::find_if(
         sets, [&](const Set& named) { return absl::EqualsIgnoreCase(named.name, section.name); });
     if (set == sets.end()) continue;
-    for (const int64_t number : set->elements) {
-      const auto element = element_at.find(number);
+    for (const InpMember& member : set->elements) {
+      const auto element = element_at.find(member.element);
       if (element != element_at.end()) of_elements[element->second] = section;
     }
   }

@@ -15,6 +15,12 @@
 
 namespace carillon::precompute {
 
+/// An element of a set, or a face of it (1 to 4, as the format counts them) of a surface.
+struct InpMember {
+  int64_t element;
+  int face = 0;  ///< 0 is the whole element
+};
+
 /// The nodes and elements of a part, an instance or a file without parts, each with its own
 /// numbers.
 struct InpScope {
@@ -23,11 +29,11 @@ struct InpScope {
     InpKind kind;
     size_t first_node;  ///< index into `element_nodes`
   };
-  /// A set. Elements may follow the set that names them.
+  /// A set or surface. Elements may follow the set that names them.
   struct Set {
     std::string name;
     std::vector<int64_t> nodes;
-    std::vector<int64_t> elements;
+    std::vector<InpMember> elements;
   };
 
   std::vector<int64_t> node_numbers;
@@ -60,7 +66,7 @@ struct InpAssemblySet {
   std::string name;
   std::string instance;
   std::vector<int64_t> nodes;
-  std::vector<int64_t> elements;
+  std::vector<InpMember> elements;
 };
 
 /// Joins bodies to one file of elements, each where it is placed. Nodes of different bodies stay

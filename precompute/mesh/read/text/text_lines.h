@@ -60,21 +60,33 @@ class TextLines {
 
   /// Returns the number of the line taken last, counted from 1.
   int number() const { return number_; }
+  /// Returns where the line taken last is, such as "line 5" or "line 5 of "nodes.inc"".
+  std::string place() const {
+    return absl::StrCat("line ", number_,
+                        file_.empty() ? "" : absl::StrCat(" of ", QuotedText(file_)));
+  }
+  /// Says that the next line is a line of another file, which the text contains. No name is the
+  /// text's own file.
+  void GoOnAt(int line, std::string_view file) {
+    number_ = line - 1;
+    file_ = file;
+  }
 
   /// Returns the text after the line taken last.
   std::string_view rest() const { return rest_; }
   void Skip(size_t bytes) { rest_.remove_prefix(bytes); }
 
   absl::Status Unreadable(absl::string_view what) const {
-    return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
-                   absl::StrCat("line ", number_, ": ", what,
-                                ": export the mesh again, or name its right format"));
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+        absl::StrCat(place(), ": ", what, ": export the mesh again, or name its right format"));
   }
 
  private:
   static constexpr std::string_view kBlanks = " \t\r\v\f";
   std::string_view rest_;
   int number_ = 0;
+  std::string file_;
 };
 
 /// Reads the next line of an OBJ file, joined with the lines that continue it after a '\' at the

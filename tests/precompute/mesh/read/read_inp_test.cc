@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -173,6 +175,25 @@ TEST_F(ReadInpTest, ShellsBesideTheTetrahedraAreNamed) {
       "inp");
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_THAT(read->warnings, ElementsAre(HasSubstr("1 triangles of the file have nodes")));
+}
+
+// The element 1 has the nodes 1, 2, 3 and 4; its face S3 lies opposite of node 1.
+TEST_F(ReadInpTest, SurfacesAreGroupsOfTheirFacesOrNodes) {
+  const std::string elements = std::string("*ASSEMBLY, NAME=A\n*INSTANCE, NAME=B, PART=Bar\n") +
+                               "*END INSTANCE\n*ELSET, ELSET=_S3, INTERNAL, INSTANCE=B\n1\n" +
+                               "*SURFACE, TYPE=ELEMENT, NAME=clamp\n_S3, S3\n";
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      Part("Bar") + elements + "*SURFACE, TYPE=NODE, NAME=two\nB.tip, 1.\nB.1\n*END ASSEMBLY\n",
+      "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  const auto group = [&](const std::string& name) {
+    const auto found = std::ranges::find(read->names.groups, name, &MeshGroup::name);
+    return found == read->names.groups.end() ? MeshGroup{} : *found;
+  };
+  EXPECT_THAT(group("clamp").simplices, ElementsAre(std::array{1, 3, 2, -1}));
+  EXPECT_THAT(group("two").simplices,
+              ElementsAre(std::array{3, -1, -1, -1}, std::array{0, -1, -1, -1}));
+  EXPECT_THAT(read->warnings, IsEmpty());
 }
 
 }  // namespace
