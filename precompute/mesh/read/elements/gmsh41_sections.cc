@@ -31,24 +31,46 @@ bool TakeMany(uint64_t count, NumberStream& stream, std::vector<T>& values) {
 }  // namespace
 
 absl::Status Gmsh41Sections::ReadEntities(NumberStream& stream) {
+  return ReadAllEntities(false, stream);
+}
+
+/// The numbers of partitions and of ghost entities, the number and partition of each of these, and
+/// the parts of entities to which the elements of a partitioned mesh belong.
+absl::Status Gmsh41Sections::ReadPartitionedEntities(NumberStream& stream) {
+  std::array<uint64_t, 2> counts{};
+  std::vector<int32_t> ghosts;
+  if (!stream.TakeAll(counts) || !TakeMany(counts[1], stream, ghosts) ||
+      !TakeMany(counts[1], stream, ghosts)) {
+    return Malformed("partitioned entities");
+  }
+  return ReadAllEntities(true, stream);
+}
+
+absl::Status Gmsh41Sections::ReadAllEntities(bool partitioned, NumberStream& stream) {
   std::array<uint64_t, 4> counts{};
   if (!stream.TakeAll(counts)) return Malformed("entities");
   for (int dimension = 0; dimension < 4; ++dimension) {
     for (uint64_t i = 0; i < counts[static_cast<size_t>(dimension)]; ++i) {
-      if (!ReadEntity(dimension, stream)) return Malformed("entities");
+      if (!ReadEntity(dimension, partitioned, stream)) return Malformed("entities");
     }
   }
   return absl::OkStatus();
 }
 
-/// An entity: its number, its position or bounding box, its physical groups, and the entities that
-/// bound it.
-bool Gmsh41Sections::ReadEntity(int dimension, NumberStream& stream) {
+/// An entity: its number, the entity and the partitions of which it is a part, its position or
+/// bounding box, its physical groups, and the entities that bound it.
+bool Gmsh41Sections::ReadEntity(int dimension, bool partitioned, NumberStream& stream) {
   int32_t number = 0;
+  std::array<int32_t, 2> parent{};
   std::vector<double> place;
   uint64_t count = 0;
-  std::vector<int32_t> physicals, bounds;
-  if (!stream.Take(number) || !TakeMany(dimension == 0 ? 3 : 6, stream, place) ||
+  std::vector<int32_t> partitions, physicals, bounds;
+  if (!stream.Take(number)) return false;
+  if (partitioned && (!stream.TakeAll(parent) || !stream.Take(count) ||
+                      !TakeMany(count, stream, partitions))) {
+    return false;
+  }
+  if ( !TakeMany(dimension == 0 ? 3 : 6, stream, place) ||
       !stream.Take(count) || !TakeMany(count, stream, physicals)) {
     return false;
   }

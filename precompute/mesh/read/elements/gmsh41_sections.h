@@ -21,11 +21,13 @@ class Gmsh41Sections {
 
   /// Reads the physical groups of the points, curves, surfaces and volumes of the geometry.
   absl::Status ReadEntities(NumberStream& stream);
+  absl::Status ReadPartitionedEntities(NumberStream& stream);
   absl::Status ReadNodes(NumberStream& stream);
   absl::Status ReadElements(NumberStream& stream);
 
  private:
-  bool ReadEntity(int dimension, NumberStream& stream);
+  absl::Status ReadAllEntities(bool partitioned, NumberStream& stream);
+  bool ReadEntity(int dimension, bool partitioned, NumberStream& stream);
   absl::Status ReadNodeBlock(NumberStream& stream);
   absl::Status ReadElementBlock(NumberStream& stream);
 

@@ -53,6 +53,9 @@ class GmshParser {
     if (section == "$MeshFormat") return ReadFormat();
     if (section == "$PhysicalNames") return ReadPhysicalNames();
     if (section == "$Entities" && is_41_) return Read41(&Gmsh41Sections::ReadEntities);
+    if (section == "$PartitionedEntities" && is_41_) {
+      return Read41(&Gmsh41Sections::ReadPartitionedEntities);
+    }
     if (section == "$Nodes" || section == "$ParametricNodes") {
       if (!is_41_) return ReadNodes(section != "$Nodes");
       return Read41(&Gmsh41Sections::ReadNodes);

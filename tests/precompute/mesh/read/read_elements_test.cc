@@ -109,14 +109,20 @@ TEST_F(ReadElementsTest, BadInpFilesAreRefusedWithTheLine) {
       {nodes + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,9\n",
        "MESH_INDEX_OUT_OF_RANGE: element 1 names node 9"},
       {nodes + "*NSET, NSET=a, GENERATE\n1, 1000000000000\n", "line 7: no range of a set"},
-      {nodes + "*INCLUDE, INPUT=more.inp\n", "line 6: the file \"more.inp\" belongs here"},
-      {"*NODE, INPUT=more.inp\n", "line 1: the file \"more.inp\" belongs here"},
       {"*NODE\n**@ 1 more.inp\n1, x, 0, 0\n", "line 1 of \"more.inp\": no node"},
       {"*NODE\n**@ 1 more.inp\n1, 0, 0, 0\n**@ 7 \nx\n", "line 7: no node"},
       {nodes, "MESH_EMPTY: "},
   };
   for (const auto& [file, message] : cases) {
     EXPECT_THAT(Refused(file, "inp"), HasSubstr(message)) << file;
+  }
+}
+
+// As a client sends it that does not know the files beside it.
+TEST_F(ReadElementsTest, AnInpWithoutTheFileThatItIncludesIsRefusedWithItsName) {
+  for (const char* file : {"*INCLUDE, INPUT=more.inp\n", "*NODE, INPUT=more.inp\n"}) {
+    EXPECT_THAT(ParseMesh(file, "inp", 1).status().ToString(),
+                HasSubstr("line 1: the file \"more.inp\" belongs here"));
   }
 }
 

@@ -50,6 +50,23 @@ TEST_F(ReadGmshTest, PhysicalGroupsOfVolumesAreRegions) {
   EXPECT_EQ(std::get<TetMesh>(read->mesh).regions, (std::vector<int32_t>{0, 1}));
 }
 
+// "gmsh -part 2" gives the elements to parts of the entities.
+TEST_F(ReadGmshTest, PartitionedVolumesKeepTheirRegions) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
+      "$PhysicalNames\n2\n3 1 \"steel\"\n3 2 \"ash\"\n$EndPhysicalNames\n"
+      "$Entities\n0 0 0 2\n1 0 0 0 1 1 1 1 1 0\n2 0 0 0 1 1 1 1 2 0\n$EndEntities\n"
+      "$PartitionedEntities\n2\n1\n9 1\n0 0 0 2\n3 3 1 2 1 2 0 0 0 1 1 1 1 1 0\n"
+      "4 3 2 1 2 0 0 0 1 1 1 1 2 0\n$EndPartitionedEntities\n"
+      "$Nodes\n1 5 1 5\n3 3 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n"
+      "$Elements\n2 2 1 2\n3 3 4 1\n1 1 2 3 4\n3 4 4 1\n2 2 3 4 5\n$EndElements\n",
+      "msh");
+  ASSERT_TRUE(read.ok()) << read.status();
+  ASSERT_EQ(read->names.regions.size(), 2u);
+  EXPECT_EQ(read->names.regions[0].name, "steel");
+  EXPECT_EQ(read->names.regions[1].name, "ash");
+}
+
 TEST_F(ReadGmshTest, LengthsAreInMetres) {
   const absl::StatusOr<Mesh> read = Read(ToTextGmsh(Box(4)), "msh", 0.5);
   ASSERT_TRUE(read.ok());
