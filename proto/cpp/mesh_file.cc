@@ -22,7 +22,6 @@
 #include "absl/strings/strip.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/gltf_uri.h"
-#include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon {
@@ -169,6 +168,10 @@ std::optional<InpInput> InputOf(absl::string_view line) {
   return std::nullopt;
 }
 
+std::string Quoted(const std::string& text) {
+  return absl::StrCat("\"", absl::CHexEscape(text), "\"");
+}
+
 /// Adds the lines of `bytes`, a file that `deck` includes or `deck` itself, and those of the files
 /// that it includes, whose names count from the folder of `deck`. A comment "**@ LINE FILE" says
 /// from where the next line is.
@@ -189,8 +192,8 @@ absl::Status AddInp(const std::filesystem::path& deck, const std::string& name, 
     if (is_outside || depth == kMostDepth) {
       return Refusal(
           absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
-          absl::StrCat("line ", number, " of ", name.empty() ? deck.string() : QuotedText(name),
-                       " includes ", QuotedText(input->file),
+          absl::StrCat("line ", number, " of ", name.empty() ? deck.string() : Quoted(name),
+                       " includes ", Quoted(input->file),
                        is_outside ? ", which is not in the folder of the file: put it "
                                     "there, and name it without its folder"
                                   : ": the files include each other without an end"));

@@ -43,7 +43,8 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
 
 
 _INPUT = re.compile(rb"""^[ \t]*\*(?:(INCLUDE)|(?:NODE|ELEMENT|NSET|ELSET))[ \t]*(?:,[^,\n]*)*?
-                        (,[ \t]*INPUT[ \t]*=[ \t]*"?([^",\r\n]+?)"?[ \t]*(?=[,\r\n]|\Z))[^\n]*\n?""", re.I | re.M | re.X)
+                        (,[ \t]*INPUT[ \t]*=[ \t]*"?([^",\r\n]+?)"?[ \t]*(?=[,\r\n]|\Z))[^\n]*\n?""",
+                    re.I | re.M | re.X)
 
 
 def _with_includes(file: pathlib.Path, data: bytes, name: str = "", depth: int = 0) -> bytes:
@@ -87,7 +88,8 @@ def _beside(file: pathlib.Path, name: str) -> pathlib.Path:
     the user sent to the daemon."""
     path = pathlib.PurePath(name)
     if path.is_absolute() or ".." in path.parts or "://" in name:
-        raise CarillonError("MESH_UNREADABLE", f'{file} keeps data in "{name}", which is not in its folder: put it there')
+        raise CarillonError("MESH_UNREADABLE", f'{file} keeps data in "{name}", which is not in its folder: put it '
+                            "there")
     return file.parent / path
 
 

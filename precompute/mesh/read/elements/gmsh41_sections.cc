@@ -66,12 +66,12 @@ bool Gmsh41Sections::ReadEntity(int dimension, bool partitioned, NumberStream& s
   uint64_t count = 0;
   std::vector<int32_t> partitions, physicals, bounds;
   if (!stream.Take(number)) return false;
-  if (partitioned && (!stream.TakeAll(parent) || !stream.Take(count) ||
-                      !TakeMany(count, stream, partitions))) {
+  if (partitioned &&
+      (!stream.TakeAll(parent) || !stream.Take(count) || !TakeMany(count, stream, partitions))) {
     return false;
   }
-  if ( !TakeMany(dimension == 0 ? 3 : 6, stream, place) ||
-      !stream.Take(count) || !TakeMany(count, stream, physicals)) {
+  if (!TakeMany(dimension == 0 ? 3 : 6, stream, place) || !stream.Take(count) ||
+      !TakeMany(count, stream, physicals)) {
     return false;
   }
   physicals_[{dimension, number}] = std::move(physicals);
