@@ -28,7 +28,6 @@
 #include "server/api/services/audio_service.h"
 #include "server/api/services/contact_service.h"
 #include "server/api/services/decomposition_service.h"
-#include "server/api/services/job_run_service.h"
 #include "server/api/services/modal_model_service.h"
 #include "server/api/services/reflection_service.h"
 #include "server/api/services/refusing_service.h"
@@ -111,7 +110,6 @@ struct ApiServer::State {
                 .clock = rooms.clock,
                 .sample_rate_hz = static_cast<double>(rooms.output.format().sample_rate_hz)}),
         decompositions(rooms.decompositions, reception, writing),
-        job_runs(rooms.runs, access, call_pool),
         heads(settings.head_file),
         scenes(rooms.scenes, owners, rooms.database, heads, reception, adding),
         contacts({.scenes = rooms.scenes,
@@ -191,7 +189,6 @@ struct ApiServer::State {
   AdminService admin;
   ModalModelService models;
   DecompositionService decompositions;
-  JobRunService job_runs;
   HeadStore heads;
   SceneService scenes;
   ContactService contacts;
@@ -211,12 +208,11 @@ struct ApiServer::State {
 };
 
 absl::Status ApiServer::State::Listen(const ApiSettings& settings) {
-  std::vector<grpc::Service*> services = {&admin,  &models,   &decompositions, &job_runs,
-                                          &scenes, &contacts, &audio,          &server_info};
+  std::vector<grpc::Service*> services = {&admin,    &models, &decompositions, &scenes,
+                                          &contacts, &audio,  &server_info};
   reflection = MakeReflectionServices(
       {v1::AdminService::service_full_name(), v1::ModalModelService::service_full_name(),
-       v1::DecompositionService::service_full_name(),
-       worker::v1::JobRunService::service_full_name(), v1::SceneService::service_full_name(),
+       v1::DecompositionService::service_full_name(), v1::SceneService::service_full_name(),
        v1::ContactService::service_full_name(), v1::AudioService::service_full_name(),
        v1::ServerService::service_full_name(), "grpc.health.v1.Health"});
   for (const auto& service : reflection) services.push_back(service.get());

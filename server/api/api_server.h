@@ -13,7 +13,6 @@
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/worker/remote_runs.h"
 #include "server/live_output/live_output.h"
 #include "server/mode_database/mode_database.h"
 #include "server/scene/scene_registry.h"
@@ -50,7 +49,6 @@ struct ApiSettings {
 struct ServedRooms {
   ModeDatabase& database;
   DecompositionQueue& decompositions;
-  RemoteRuns& runs;
   SceneRegistry& scenes;
   LiveOutput& output;
   Clock& clock;

@@ -37,7 +37,6 @@
 #include "server/daemon/watchdog.h"
 #include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/worker/local_executor.h"
-#include "server/decomposition/worker/remote_runs.h"
 #include "server/decomposition/worker/slurm_executor.h"
 #include "server/decomposition/worker/work_folder.h"
 #include "server/live_output/live_output.h"
@@ -107,33 +106,23 @@ void LogOutput(const LiveOutput& output) {
                output.format().sample_rate_hz, state.latency_s * 1000);
 }
 
-absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options,
-                                                       const DataDirectory& directory,
-                                                       const Clock& clock, RemoteRuns& runs) {
+absl::StatusOr<std::unique_ptr<Executor>> MakeExecutor(const Options& options, const Clock& clock) {
   if (!options.uses_slurm()) return MakeLocalExecutor(LocalExecutorOptionsOf(options), clock);
   SlurmExecutorOptions slurm;
   slurm.program = options.precompute_program;
   slurm.directory = options.slurm_directory;
-  if (slurm.directory.empty()) slurm.directory = directory.database_file().parent_path() / "slurm";
-  const char* const tls_roots = std::getenv("CARILLON_TLS_ROOTS");
-  slurm.upload = {.address = options.slurm_upload,
-                  .client = std::filesystem::path(slurm.program).replace_filename("carillon"),
-                  .tls_roots_file = tls_roots == nullptr ? "" : tls_roots};
   if (options.worker_count > 0) slurm.job_count = options.worker_count;
   if (options.job_memory_mib > 0) {
     slurm.memory_limit_bytes = static_cast<uint64_t>(options.job_memory_mib) << 20U;
   }
   slurm.time_limit = std::chrono::seconds(static_cast<int64_t>(options.job_time_s));
-  return MakeSlurmExecutor(slurm, runs);
+  return MakeSlurmExecutor(slurm);
 }
 
 absl::StatusOr<std::unique_ptr<DecompositionQueue>> MakeQueue(const Options& options,
-                                                              const DataDirectory& directory,
                                                               ModeDatabase& database,
-                                                              const Clock& clock,
-                                                              RemoteRuns& runs) {
-  ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor,
-                   MakeExecutor(options, directory, clock, runs));
+                                                              const Clock& clock) {
+  ASSIGN_OR_RETURN(std::unique_ptr<Executor> executor, MakeExecutor(options, clock));
   return DecompositionQueue::Make(
       database, std::move(executor), clock,
       {.max_queued_count = kMostQueuedJobs,
@@ -226,9 +215,8 @@ absl::Status Run(Options options, const ReadOptions& read_options, const StopGua
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
                    ModeDatabase::Open(directory.database_file(), clock));
   Tidy(*database, options);
-  RemoteRuns runs;
   ASSIGN_OR_RETURN(const std::unique_ptr<DecompositionQueue> decompositions,
-                   MakeQueue(options, directory, *database, clock, runs));
+                   MakeQueue(options, *database, clock));
   ASSIGN_OR_RETURN(const std::unique_ptr<LiveOutput> output,
                    LiveOutput::Start(OutputSettingsOf(options), clock, LogWarning));
   SceneRegistry scenes(output->mixer(), &database->transfers());
@@ -238,7 +226,6 @@ absl::Status Run(Options options, const ReadOptions& read_options, const StopGua
   ASSIGN_OR_RETURN(const std::unique_ptr<ApiServer> server,
                    ApiServer::Start(ApiSettingsOf(options), {.database = *database,
                                                              .decompositions = *decompositions,
-                                                             .runs = runs,
                                                              .scenes = scenes,
                                                              .output = *output,
                                                              .clock = clock,

@@ -86,11 +86,6 @@ absl::string_view HostOf(absl::string_view text) {
   return has_port && port > 0 && port < 65536 ? text.substr(0, colon) : "";
 }
 
-std::string Address(const std::string& text) {
-  if (text.empty() || !HostOf(text).empty()) return "";
-  return absl::StrCat("\"", text, "\" must be HOST:PORT, as the nodes reach it");
-}
-
 std::string MetricsAddress(const std::string& text) {
   const absl::string_view host = HostOf(text);
   if (text.empty() || (!host.empty() && !absl::StrContains(host, ':'))) return "";
@@ -158,10 +153,6 @@ const std::vector<Setting>& Settings() {
        "folder shared with the nodes of a Slurm cluster, to which sbatch submits the "
        "decompositions [they run on this machine]",
        Any},
-      {"slurm_upload", &O::slurm_upload,
-       "HOST:PORT at which the nodes of a Slurm cluster reach this daemon, to fetch meshes and "
-       "upload results without a shared folder",
-       Address},
   };
   return settings;
 }

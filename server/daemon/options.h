@@ -32,7 +32,6 @@ struct Options {
   int64_t model_budget_mib = 0;    ///< size of stored models; 0 means no limit
   std::string precompute_program;  ///< path of carillon-precompute
   std::string slurm_directory;     ///< shared with the nodes of a Slurm cluster
-  std::string slurm_upload;  ///< HOST:PORT at which nodes without that folder reach the daemon
   std::string tls_certificate_file;
   std::string tls_key_file;
   std::string tls_client_roots_file;
@@ -45,7 +44,7 @@ struct Options {
   bool operator==(const Options&) const = default;
 
   /// Whether a Slurm cluster runs the decompositions, rather than this machine.
-  bool uses_slurm() const { return !slurm_directory.empty() || !slurm_upload.empty(); }
+  bool uses_slurm() const { return !slurm_directory.empty(); }
 };
 
 /// Exit status after an error in the command line or in the configuration file.

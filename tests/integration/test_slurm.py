@@ -10,7 +10,6 @@ import pathlib
 import random
 import shutil
 import signal
-import socket
 import sqlite3
 import subprocess
 import tempfile
@@ -22,7 +21,7 @@ import meshes
 import scripted
 import strike
 from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_pb2
-from daemon import BIN, ROOT, Daemon
+from daemon import ROOT, Daemon
 
 BODY_COUNT = int(os.environ.get("CARILLON_SLURM_BODIES", "4"))
 SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
@@ -151,58 +150,6 @@ class SlurmTest(unittest.TestCase):
         self.assertEqual(self.stored(), (BODY_COUNT, BODY_COUNT, 0))
         print(f"\nseed {SEED}: {BODY_COUNT} bodies, slurmctld killed {BATCH_COUNT} times, slurmd once, the daemon "
               f"twice: {BODY_COUNT} models stored once each")
-
-    def start_uploading_daemon(self, worker):
-        """One whose nodes know an address of it, and the worker refuses to see its folder."""
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            address = f"127.0.0.1:{free.getsockname()[1]}"
-        guarded = self.folder / "guarded.sh"
-        guarded.write_text(f"""#!/bin/sh
-case "$PWD $*" in *{self.folder}/data*) exit 9 ;; esac
-[ -z "$CARILLON_JOB_TOKEN" ] || exit 9
-exec {worker} "$@"
-""")
-        guarded.chmod(0o700)
-        (self.folder / "carillon").symlink_to(BIN / "carillon")  # the nodes look for it beside the worker
-        self.start_daemon("--listen", address, "--slurm-upload", address, "--precompute", guarded)
-
-    def test_every_model_is_uploaded_once_though_slurmctld_and_the_daemon_are_killed(self):
-        count = max(4, BODY_COUNT // 4)
-        self.start_uploading_daemon(BIN / "carillon-precompute")
-        jobs = [self.create(self.daemon.client(), number) for number in range(count)]
-        time.sleep(self.rng.uniform(0, LATEST_KILL_S))  # when they die is the experiment
-        self.cluster.kill("slurmctld")
-        self.daemon.kill()
-        time.sleep(self.rng.uniform(0, 1))  # a run may end meanwhile, and has to wait
-        self.daemon.start()
-        for job in jobs:
-            self.wait(job)
-        self.assertEqual(self.daemon.stop(), 0)
-        self.assertEqual(self.stored(), (count, count, 0))
-        self.assertEqual([*(self.folder / "data/slurm").iterdir()], [])
-        print(f"\nseed {SEED}: {count} bodies by upload, slurmctld and the daemon killed once: {count} models "
-              "stored once each")
-
-    def test_progress_and_refusals_come_by_upload(self):
-        folder = self.folder
-        scripted.make_model(folder)
-        self.start_uploading_daemon(scripted.worker(folder, """
-case $((nodes % 10)) in
-  2) exec BIN/carillon-precompute "$@" ;;
-  *) while [ ! -e "$here/enough" ]; do printf '\\013\\012\\011\\021\\0\\0\\0\\0\\0\\0\\340\\077' >&3; sleep 0.2; done
-     cp "$here/bar.model" "$out" ;;
-esac""".replace("BIN", str(BIN))))
-        client = self.daemon.client()
-        silent = self.create(client, 2, max_frequency_hz=21, min_frequency_hz=20)
-        job = self.create(client, 3)
-        for seen in client.jobs.WatchJob(decomposition_service_pb2.WatchJobRequest(name=job.name)):
-            if seen.job.progress.fraction == 0.5:
-                (folder / "enough").touch()
-        self.assertEqual(seen.job.state, decomposition_pb2.JOB_STATE_SUCCEEDED)
-        with self.assertRaises(strike.Refused) as refused:
-            client.wait(silent)
-        self.assertEqual(refused.exception.info.reason, "NO_MODE_IN_BAND")
 
     def test_verdicts_come_through_the_cluster(self):
         body = """

@@ -54,10 +54,6 @@ def methods_of_contract():
         for service in module.DESCRIPTOR.services_by_name.values():
             for method in service.methods:
                 yield f"/{service.full_name}/{method.name}"
-    # The Python package has no module of the private calls, so the test reads the methods from their file.
-    private = (ROOT / "proto/carillon/worker/v1/job_run_service.proto").read_text()
-    for method in re.findall(r"^  rpc (\w+)\(", private, re.MULTILINE):
-        yield f"/carillon.worker.v1.JobRunService/{method}"
 
 
 class NoAccessFileTest(unittest.TestCase):

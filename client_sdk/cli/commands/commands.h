@@ -16,10 +16,6 @@
 #include "client_sdk/cli/output/message_json.h"
 #include "client_sdk/cli/output/rendered_file.h"
 
-namespace carillon::client {
-class JobRunClient;
-}  // namespace carillon::client
-
 namespace carillon::cli {
 
 /// The options of `carillon model create`.
@@ -79,13 +75,6 @@ struct TuneOptions {
   uint32_t mode = 1;         ///< counted from 1
   double to_hz = 0;
   std::string by = "size";  ///< or "length", "thickness", "x", "y", "z"
-};
-
-/// The options of `carillon job run`.
-struct RunJobOptions {
-  std::string digest;
-  std::string token;
-  std::vector<std::string> command;
 };
 
 /// The options of `carillon strike`.
@@ -217,14 +206,6 @@ absl::Status WatchJob(const client::Client& daemon, const std::string& text, boo
 /// Prints the jobs that wait or run, and then each job that matches when its state changes, or with
 /// `json` at each change, as long as somebody reads.
 absl::Status WatchJobs(const client::Client& daemon, const v1::WatchJobsRequest& filter, bool json);
-/// Runs a decomposition for the daemon on this machine. Fetches the mesh of the job as the file
-/// "mesh" into a new folder, writes the standard input to the file "request" beside it, runs the
-/// command there, reports its progress (WorkerEvent on descriptor 3), and uploads the file "model"
-/// or the error. Calls that find no daemon are repeated for ten minutes. Errors: those of
-/// JobRunService, Internal (OUTPUT_NOT_WRITABLE: the folder cannot be made), Cancelled
-/// (RUN_STOPPED).
-absl::Status RunJob(const client::JobRunClient& run, const std::vector<std::string>& command,
-                    const StopSignal& stop);
 absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,

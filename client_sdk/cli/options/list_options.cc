@@ -15,33 +15,9 @@
 #include "client_sdk/cli/options/fit_options.h"
 #include "client_sdk/cli/options/sound_options.h"
 #include "client_sdk/cli/options/value_options.h"
-#include "client_sdk/job_runs/job_run_client.h"
 
 namespace carillon::cli {
 namespace {
-
-/// Adds the command that runs a job on this machine.
-void AddJobRun(CLI::App& job, Program& program) {
-  auto options = std::make_shared<RunJobOptions>();
-  CLI::App& run = *job.add_subcommand(
-      "run", "Run a job of the daemon on this machine; the batch jobs of a cluster call it");
-  run.add_option("digest", options->digest, "The digest of the job")->required();
-  run.add_option("command", options->command,
-                 "The command that reads the file mesh and writes the file model")
-      ->required();
-  run.add_option("--token", options->token, "The token of this run [$CARILLON_JOB_TOKEN]")
-      ->envname("CARILLON_JOB_TOKEN")
-      ->required();
-  run.callback([&program, options] {
-    program.command = [&program, options] {
-      const StopSignal stop;
-      const client::JobRunClient calls(
-          program.server, program.Connection(),
-          {.job = absl::StrCat("jobs/", options->digest), .token = options->token});
-      return RunJob(calls, options->command, stop);
-    };
-  });
-}
 
 /// Adds a command about one thing, which `description` says how to name.
 template <class Run>
@@ -133,7 +109,6 @@ void AddJob(CLI::App& app, Program& program) {
       return CancelJobs(*program.Daemon(), *cancelled, program.json);
     };
   });
-  AddJobRun(job, program);
 }
 
 void AddMaterials(CLI::App& app, Program& program) {

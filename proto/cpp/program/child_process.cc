@@ -55,7 +55,6 @@ absl::Status NotExecuted(const std::string& program, int error) {
 struct Preparation {
   std::vector<char*> arguments{};
   std::vector<char*> environment{};
-  const char* folder = nullptr;
   std::array<int, 4> descriptors{};  // of this process, by their number in the child
   bool is_worker = false;
   int nice = 0;
@@ -102,7 +101,6 @@ Preparation Prepare(const ChildCommand& command, int failure) {
     child.arguments.push_back(const_cast<char*>(word.c_str()));
   }
   child.arguments.push_back(nullptr);
-  if (!command.folder.empty()) child.folder = command.folder.c_str();
   child.descriptors = {command.input, command.output, command.errors, command.events};
   child.is_worker = command.worker_processor_count > 0;
   child.nice = command.worker_nice;
@@ -167,8 +165,7 @@ bool ArrangeDescriptors(std::array<int, 4> descriptors) {
   const int failure = fcntl(child.failure, F_DUPFD_CLOEXEC, kFirstSpareDescriptor);
   if (child.is_worker) BecomeWorker(child);
   ResetSignals();
-  if (ArrangeDescriptors(child.descriptors) &&
-      (child.folder == nullptr || chdir(child.folder) == 0)) {
+  if (ArrangeDescriptors(child.descriptors)) {
     // glibc's function allocates no memory.
     execvpe(child.arguments[0], child.arguments.data(), child.environment.data());
   }

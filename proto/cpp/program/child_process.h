@@ -56,8 +56,7 @@ struct ChildCommand {
   int input = -1;
   int output = -1;
   int errors = -1;
-  int events = -1;       ///< becomes descriptor 3; -1 if the child has none
-  std::string folder{};  ///< working directory; if empty, that of this process
+  int events = -1;  ///< becomes descriptor 3; -1 if the child has none
   /// If above zero, the child is a worker that yields to everything else. It leads a process group,
   /// which Kill ends as a whole. The kernel kills it when the thread that started it ends. It has
   /// the niceness `worker_nice`, is the first process killed when memory runs out, and leaves no

@@ -31,8 +31,8 @@ constexpr int kLooksBeforeLost = 2;
 
 class SlurmExecutor final : public Executor {
  public:
-  SlurmExecutor(SlurmExecutorOptions options, RemoteRuns& runs)
-      : options_(std::move(options)), runs_(runs), thread_([this] { Run(); }) {}
+  explicit SlurmExecutor(SlurmExecutorOptions options)
+      : options_(std::move(options)), thread_([this] { Run(); }) {}
 
   ~SlurmExecutor() override {
     {
@@ -112,7 +112,7 @@ class SlurmExecutor final : public Executor {
 
   void Prepare(DecompositionTask task) {
     const auto on_end = task.on_end;
-    absl::StatusOr<SlurmTask> prepared = SlurmTask::Prepare(std::move(task), options_, runs_);
+    absl::StatusOr<SlurmTask> prepared = SlurmTask::Prepare(std::move(task), options_);
     if (prepared.ok()) {
       tasks_.push_back({*std::move(prepared), 0});
     } else {
@@ -198,7 +198,6 @@ class SlurmExecutor final : public Executor {
   }
 
   const SlurmExecutorOptions options_;
-  RemoteRuns& runs_;
   const int wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   std::list<Tracked> tasks_;     // of the thread
   std::set<std::string> ended_;  // of the thread: names of jobs since the last look at the queue
@@ -211,8 +210,7 @@ class SlurmExecutor final : public Executor {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options,
-                                                            RemoteRuns& runs) {
+absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options) {
   std::error_code error;
   SlurmExecutorOptions filled = options;
   filled.directory = std::filesystem::absolute(options.directory);
@@ -223,8 +221,7 @@ absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorO
                    absl::StrCat("the folder ", filled.directory.string(), " cannot be made (",
                                 error.message(), "): name one that every node shares"));
   }
-  SlurmTask::AdmitLeft(filled.directory, runs);
-  return std::make_unique<SlurmExecutor>(std::move(filled), runs);
+  return std::make_unique<SlurmExecutor>(std::move(filled));
 }
 
 }  // namespace carillon

@@ -9,11 +9,7 @@
 
 namespace carillon {
 
-class RemoteRuns;
-
-/// Runs each decomposition as a job of a Slurm cluster, with files in a shared folder. With
-/// `upload` no folder is shared. Each submission then has a token, with which its run fetches the
-/// mesh and uploads the result through `runs`. `runs` must outlive the executor.
+/// Runs each decomposition as a job of a Slurm cluster, with files in a shared folder.
 ///
 /// Slurm may forget jobs. A controller that is killed loses the submissions that it acknowledged in
 /// its last seconds, and assigns their numbers again. Therefore a job is named by its digest and
@@ -21,7 +17,6 @@ class RemoteRuns;
 /// that puts a result there counts. A job that has not ended and is not in Slurm's queue is
 /// submitted again. Jobs outlive the executor, and the next executor adopts them. Errors:
 /// FailedPrecondition (DATABASE_UNUSABLE: the directory cannot be made).
-absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options,
-                                                            RemoteRuns& runs);
+absl::StatusOr<std::unique_ptr<Executor>> MakeSlurmExecutor(const SlurmExecutorOptions& options);
 
 }  // namespace carillon

@@ -8,20 +8,10 @@
 
 namespace carillon {
 
-/// Access to the daemon for nodes that share no folder with it.
-struct SlurmUpload {
-  std::string address{};  ///< HOST:PORT of the daemon for the nodes; empty if a folder is shared
-  std::filesystem::path client{};  ///< path of `carillon` on every node
-  std::string tls_roots_file{};    ///< PEM, on every node; without TLS if empty
-};
-
 struct SlurmExecutorOptions {
-  std::filesystem::path program{};  ///< carillon-precompute, on every node
-  std::filesystem::path
-      directory{};  ///< mounted at the same path on every node, unless they upload
-  SlurmUpload upload{};
-  std::string partition{};  ///< if empty, the cluster's default
-  int job_count = 200;      ///< jobs in the cluster's queue at a time
+  std::filesystem::path program{};    ///< carillon-precompute, on every node
+  std::filesystem::path directory{};  ///< mounted at the same path on every node
+  int job_count = 200;                ///< jobs in the cluster's queue at a time
   int threads_per_job = 1;
   uint64_t memory_limit_bytes = 64ULL << 30;  ///< memory of one job
   std::chrono::seconds time_limit = std::chrono::hours(6);

@@ -65,18 +65,18 @@ std::optional<SlurmState> ReadSacct(const std::string& name, const std::string& 
 }
 
 bool Submit(const SlurmJob& job) {
-  std::vector<std::string> command = {"sbatch",
-                                      "--parsable",
-                                      absl::StrCat("--job-name=", job.name),
-                                      absl::StrCat("--comment=", job.ticket),
-                                      absl::StrCat("--cpus-per-task=", job.thread_count),
-                                      absl::StrCat("--mem=", (job.memory_bytes >> 20U) + 1, "M"),
-                                      absl::StrCat("--time=", job.time_limit_s / 60 + 1),
-                                      "--requeue",
-                                      "--output=/dev/null",
-                                      "--error=/dev/null",
-                                      "--chdir=/"};
-  if (!job.partition.empty()) command.push_back(absl::StrCat("--partition=", job.partition));
+  const std::vector<std::string> command = {
+      "sbatch",
+      "--parsable",
+      absl::StrCat("--job-name=", job.name),
+      absl::StrCat("--comment=", job.ticket),
+      absl::StrCat("--cpus-per-task=", job.thread_count),
+      absl::StrCat("--mem=", (job.memory_bytes >> 20U) + 1, "M"),
+      absl::StrCat("--time=", job.time_limit_s / 60 + 1),
+      "--requeue",
+      "--output=/dev/null",
+      "--error=/dev/null",
+      "--chdir=/"};
   return RunCommand(command, job.script).success;
 }
 

@@ -24,7 +24,6 @@ struct SlurmJob {
   std::string name;
   std::string ticket;
   std::string script{};  ///< the text of the script
-  std::string partition;
   int thread_count = 1;
   uint64_t memory_bytes = 0;
   int64_t time_limit_s = 0;

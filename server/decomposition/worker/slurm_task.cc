@@ -5,17 +5,18 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <random>
 #include <sstream>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/decomposition/job/job_rules.h"
-#include "server/decomposition/worker/random_digits.h"
 #include "server/decomposition/worker/worker_command.h"
 #include "server/decomposition/worker/worker_events.h"
 
@@ -24,9 +25,7 @@ namespace {
 
 // A run that vanishes without a word three times is taken to crash.
 constexpr int kMostRuns = 3;
-constexpr int kTicketWords = 2;                     // of 32 bits
-constexpr char kEndOfRequest[] = "END_OF_REQUEST";  // no line of protobuf's text form is so
-constexpr int kSignalled = 128;                     // what a shell adds to the number of a signal
+constexpr int kSignalled = 128;  // what a shell adds to the number of a signal
 constexpr int kKilled = kSignalled + 9;
 
 std::string ReadFile(const std::filesystem::path& file) {
@@ -58,8 +57,7 @@ std::string Joined(const std::vector<std::string>& command) {
 }
 
 // A link can be made once: of several runs of one job, one ends it.
-std::string ScriptInFolder(const std::filesystem::path& folder,
-                           const std::vector<std::string>& command) {
+std::string Script(const std::filesystem::path& folder, const std::vector<std::string>& command) {
   // The name of the result is known to the run alone.
   const std::string words =
       absl::StrReplaceAll(Joined(command), {{Quoted("--out=@model@"), "--out=\"model.$run\""}});
@@ -78,28 +76,13 @@ exit 0
 )");
 }
 
-// The client fetches the mesh, runs the command beside it and brings the model. It takes
-// the request from its standard input, which is the rest of this script, and puts it into the file
-// "request" beside the mesh. Slurm shows a script to its owner alone.
-std::string ScriptThatUploads(const SlurmUpload& upload, const std::string& call,
-                              const std::string& token, const std::string& request) {
-  return absl::StrCat("#!/bin/sh\nexport CARILLON_SERVER=", Quoted(upload.address),
-                      "\nexport CARILLON_TLS_ROOTS=", Quoted(upload.tls_roots_file),
-                      "\nexport CARILLON_JOB_TOKEN=", Quoted(token), "\nexec ",
-                      Quoted(upload.client.string()), " job run ", call, " <<'", kEndOfRequest,
-                      "'\n", request, kEndOfRequest, "\n");
+std::string ReadTicket(const std::filesystem::path& folder) {
+  return std::string(absl::StripAsciiWhitespace(ReadFile(folder / "ticket")));
 }
 
-/// The file "ticket".
-struct Ticket {
-  std::string name;
-  std::string token_hash;
-};
-
-Ticket ReadTicket(const std::filesystem::path& folder) {
-  Ticket ticket;
-  std::istringstream(ReadFile(folder / "ticket")) >> ticket.name >> ticket.token_hash;
-  return ticket;
+std::string NewTicket() {
+  std::random_device random;
+  return absl::StrCat(absl::Hex(random()), "-", absl::Hex(random()));
 }
 
 // The events of a run; what follows after the last whole one is ignored.
@@ -135,12 +118,11 @@ Outcome Crashed(absl::string_view how) {
 }  // namespace
 
 absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
-                                             const SlurmExecutorOptions& options,
-                                             RemoteRuns& runs) {
-  SlurmTask result(std::move(task), options, runs);
+                                             const SlurmExecutorOptions& options) {
+  SlurmTask result(std::move(task), options);
   const DecompositionTask& own = result.task_;
   const std::string request = WorkerRequestFile(own);
-  if (ReadFile(result.folder_ / "request") != request || ReadTicket(result.folder_).name.empty()) {
+  if (ReadFile(result.folder_ / "request") != request || ReadTicket(result.folder_).empty()) {
     RETURN_IF_ERROR(result.MakeFolder(request));
   }
   const uint64_t reserved =
@@ -151,8 +133,7 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
   const double wanted_s = own.request.time_limit_s();
   result.job_ = {
       .name = own.digest,
-      .ticket = ReadTicket(result.folder_).name,
-      .partition = options.partition,
+      .ticket = ReadTicket(result.folder_),
       .thread_count = options.threads_per_job,
       .memory_bytes = reserved,
       .time_limit_s = wanted_s > 0 ? std::min<int64_t>(std::llround(wanted_s), limit_s) : limit_s};
@@ -161,51 +142,29 @@ absl::StatusOr<SlurmTask> SlurmTask::Prepare(DecompositionTask task,
 
 // The ticket comes last: without it the folder is not taken up.
 absl::Status SlurmTask::MakeFolder(const std::string& request) {
-  runs_->Dismiss(task_.digest);
   std::error_code error;
   std::filesystem::remove_all(folder_, error);
   if (!std::filesystem::create_directories(folder_, error)) {
     return Unusable(folder_, error.message());
   }
   RETURN_IF_ERROR(task_.write_input(folder_ / "mesh"));
-  if (!WriteFile(folder_ / "request", request) ||
-      !WriteFile(folder_ / "ticket", RandomDigits(kTicketWords))) {
+  if (!WriteFile(folder_ / "request", request) || !WriteFile(folder_ / "ticket", NewTicket())) {
     return Unusable(folder_, "a file cannot be written");
   }
   return absl::OkStatus();
 }
 
 absl::StatusOr<SlurmJob> SlurmTask::NextSubmission() {
-  const std::string token = RemoteRuns::NewToken();
-  const std::string hash = uploads() ? RemoteRuns::HashOf(task_.digest, token) : "";
-  const std::string ticket = RandomDigits(kTicketWords);
-  if (!WriteFile(folder_ / "ticket", absl::StrCat(ticket, " ", hash))) {
-    return Unusable(folder_, "a file cannot be written");
-  }
+  const std::string ticket = NewTicket();
+  if (!WriteFile(folder_ / "ticket", ticket)) return Unusable(folder_, "a file cannot be written");
   job_.ticket = ticket;
-  if (uploads()) runs_->Admit(task_.digest, folder_, hash);
-  const bool shared = !uploads();
-  const std::vector<std::string> command =
-      WorkerCommand({.program = options_->program,
-                     .mesh_file = shared ? folder_ / "mesh" : "mesh",
-                     .request_file = shared ? folder_ / "request" : "request",
-                     .model_file = shared ? "@model@" : "model",
-                     .thread_count = options_->threads_per_job});
   SlurmJob job = job_;
-  job.script = shared ? ScriptInFolder(folder_, command)
-                      : ScriptThatUploads(options_->upload,
-                                          absl::StrCat(task_.digest, " --", Joined(command)), token,
-                                          ReadFile(folder_ / "request"));
+  job.script = Script(folder_, WorkerCommand({.program = options_->program,
+                                              .mesh_file = folder_ / "mesh",
+                                              .request_file = folder_ / "request",
+                                              .model_file = "@model@",
+                                              .thread_count = options_->threads_per_job}));
   return job;
-}
-
-void SlurmTask::AdmitLeft(const std::filesystem::path& directory, RemoteRuns& runs) {
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(directory, ignored)) {
-    const Ticket ticket = ReadTicket(entry.path());
-    if (ticket.token_hash.empty()) continue;
-    runs.Admit(entry.path().filename().string(), entry.path(), ticket.token_hash);
-  }
 }
 
 int SlurmTask::RunCount() const {
@@ -257,7 +216,11 @@ std::optional<Outcome> SlurmTask::TakeEnd() const {
 
 std::optional<Outcome> SlurmTask::JudgeLoss(std::optional<SlurmState> state) const {
   if (state == SlurmState::kOutOfMemory && RunCount() == 0) {
-    return Failure(Verdict::kCrashed, InternalError("WORKER_NOT_STARTED", NotBegun()));
+    return Failure(Verdict::kCrashed,
+                   InternalError("WORKER_NOT_STARTED",
+                                 absl::StrCat("the cluster's node could not begin: see that it has "
+                                              "the folder ",
+                                              folder_.string(), " under this name")));
   }
   if (state == SlurmState::kOutOfMemory) return OutOfItsMemory(job_.memory_bytes);
   if (state == SlurmState::kTimeout) {
@@ -273,18 +236,7 @@ std::optional<Outcome> SlurmTask::JudgeLoss(std::optional<SlurmState> state) con
   return std::nullopt;
 }
 
-std::string SlurmTask::NotBegun() const {
-  if (!uploads()) {
-    return absl::StrCat("the cluster's node could not begin: see that it has the folder ",
-                        folder_.string(), " under this name");
-  }
-  return absl::StrCat("the cluster's node could not begin: see that it has ",
-                      options_->upload.client.string(), " and that a carillond answers it at ",
-                      options_->upload.address);
-}
-
 void SlurmTask::Remove() const {
-  runs_->Dismiss(task_.digest);
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }

@@ -2,9 +2,6 @@
 #include "server/decomposition/worker/worker_events.h"
 
 #include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/util/delimited_message_util.h>
-
-#include <sstream>
 
 #include "proto/cpp/error_reason.h"
 
@@ -48,12 +45,6 @@ absl::Status WorkerEventReader::Feed(
   }
   pending_.erase(0, begin);
   return absl::OkStatus();
-}
-
-std::string Delimited(const worker::v1::WorkerEvent& event) {
-  std::ostringstream out;
-  google::protobuf::util::SerializeDelimitedToOstream(event, &out);
-  return out.str();
 }
 
 }  // namespace carillon

@@ -26,7 +26,4 @@ class WorkerEventReader {
   std::string pending_;
 };
 
-/// Returns the bytes of an event on the pipe.
-std::string Delimited(const worker::v1::WorkerEvent& event);
-
 }  // namespace carillon

@@ -26,7 +26,6 @@ struct DaemonRooms {
     server = *ApiServer::Start(
         settings, {.database = *database,
                    .decompositions = *queue,
-                   .runs = runs,
                    .scenes = scenes,
                    .output = *output,
                    .clock = clock,
@@ -69,7 +68,6 @@ struct DaemonRooms {
   std::unique_ptr<LiveOutput> output =
       *LiveOutput::Start({.device = "null"}, clock, [](const std::string&) {});
   SceneRegistry scenes{output->mixer()};
-  RemoteRuns runs;
   std::unique_ptr<ApiServer> server;
 };
 

@@ -70,13 +70,13 @@ TEST_F(ReflectionTest, ListsEveryService) {
   for (const auto& service : answer.list_services_response().service()) {
     names.push_back(service.name());
   }
-  EXPECT_THAT(names, UnorderedElementsAre(
-                         "carillon.v1.AdminService", "carillon.v1.AudioService",
-                         "carillon.v1.ContactService", "carillon.v1.DecompositionService",
-                         "carillon.worker.v1.JobRunService", "carillon.v1.ModalModelService",
-                         "carillon.v1.SceneService", "carillon.v1.ServerService",
-                         "grpc.health.v1.Health", "grpc.reflection.v1.ServerReflection",
-                         "grpc.reflection.v1alpha.ServerReflection"));
+  EXPECT_THAT(names,
+              UnorderedElementsAre("carillon.v1.AdminService", "carillon.v1.AudioService",
+                                   "carillon.v1.ContactService", "carillon.v1.DecompositionService",
+                                   "carillon.v1.ModalModelService", "carillon.v1.SceneService",
+                                   "carillon.v1.ServerService", "grpc.health.v1.Health",
+                                   "grpc.reflection.v1.ServerReflection",
+                                   "grpc.reflection.v1alpha.ServerReflection"));
   EXPECT_TRUE(reflected.End().ok());
 }
 

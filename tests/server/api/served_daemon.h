@@ -18,7 +18,6 @@
 #include "carillon/v1/modal_model_service.grpc.pb.h"
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "carillon/v1/server_service.grpc.pb.h"
-#include "carillon/worker/v1/job_run_service.grpc.pb.h"
 #include "server/api/api_server.h"
 #include "server/live_output/live_output.h"
 #include "tests/server/api/daemon_rooms.h"
@@ -40,7 +39,6 @@ class ServedDaemon : public testing::Test {
     scenes = v1::SceneService::NewStub(channel_);
     contacts = v1::ContactService::NewStub(channel_);
     audio = v1::AudioService::NewStub(channel_);
-    job_runs = worker::v1::JobRunService::NewStub(channel_);
     info = v1::ServerService::NewStub(channel_);
   }
 
@@ -148,11 +146,9 @@ class ServedDaemon : public testing::Test {
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::ContactService::Stub> contacts;
   std::unique_ptr<v1::AudioService::Stub> audio;
-  std::unique_ptr<worker::v1::JobRunService::Stub> job_runs;
   std::unique_ptr<v1::ServerService::Stub> info;
   std::shared_ptr<grpc::Channel> channel() { return channel_; }
   LiveOutput& output() { return *rooms_.output; }
-  RemoteRuns& runs() { return rooms_.runs; }
   std::filesystem::path folder() const { return rooms_.folder / ""; }
   const std::string& address() const { return rooms_.address; }
   const std::vector<std::string>& addresses() const { return rooms_.server->addresses(); }

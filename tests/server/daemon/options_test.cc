@@ -104,28 +104,6 @@ TEST_F(OptionsFile, WhatTheFileMayNotSayIsRefusedByName) {
   expect("log_level = \"loud\"\n",
          " line 1: log_level: \"loud\" must be one of debug, info, warning, error");
   expect("log_level = \"off\"\n", " line 1: log_level");
-  for (const char* address : {"head", ":1", "head:", "head:0", "head:65536"}) {
-    expect((std::string("slurm_upload = \"") + address + "\"\n").c_str(), " line 1: slurm_upload");
-  }
-}
-
-TEST_F(OptionsFile, AValueOfAnotherTypeIsRefused) {
-  for (const char* const text :
-       {"workers = true", "client_share = false", "transfers = \"yes\"", "data_dir = true",
-        "listen = [true]", "workers = [1]", "workers = \"1\"", "job_time = 2026-11-27"}) {
-    const std::string line(text);
-    ExpectRefused(line, absl::StrCat(" line 1: ", line.substr(0, line.find(' ')),
-                                     " has a value of the wrong type")
-                            .c_str());
-  }
-  ExpectRefused("workers = 1.5\n", " line 1: ");
-}
-
-TEST_F(OptionsFile, ATextMayHaveAnyCharacter) {
-  const std::string path = "unix:/a #b;[c],d=\\\"e\" --f";
-  const auto command = Read({"--config", Write("listen = 'unix:/a #b;[c],d=\\\"e\" --f'\n")});
-  ASSERT_TRUE(command.ok()) << command.status();
-  EXPECT_THAT(command->options.addresses, ElementsAre(path));
 }
 
 TEST_F(OptionsFile, MetricsHaveOneAddress) {
@@ -180,23 +158,9 @@ TEST(Options, AFlagWithoutAValueDoesNotTakeTheNextFlagForIt) {
               HasSubstr("INVALID_CONFIGURATION: "));
 }
 
-TEST(Options, TheVersionIsPrintedInsteadOfARun) {
-  testing::internal::CaptureStdout();
-  const absl::StatusOr<CommandLine> version = Read({"--version"});
-  EXPECT_EQ(testing::internal::GetCapturedStdout(), "carillond 0\n");
-  ASSERT_TRUE(version.ok()) << version.status();
-  EXPECT_FALSE(version->run);
-}
-
-TEST(Options, AnUnknownFlagIsRefused) {
-  EXPECT_THAT(Read({"--loud"}).status().ToString(),
-              testing::AllOf(HasSubstr("INVALID_CONFIGURATION: "), HasSubstr("--loud")));
-}
-
-TEST(Options, AClusterRunsDecompositionsIfItHasAFolderOrAnAddress) {
+TEST(Options, AClusterRunsDecompositionsIfItHasAFolder) {
   EXPECT_FALSE(Read({})->options.uses_slurm());
   EXPECT_TRUE(Read({"--slurm-dir", "/shared"})->options.uses_slurm());
-  EXPECT_TRUE(Read({"--slurm-upload", "head:7420"})->options.uses_slurm());
 }
 
 }  // namespace

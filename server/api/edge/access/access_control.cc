@@ -67,8 +67,7 @@ absl::Status MissingRole(const Principal& principal, Role role, bool is_anybody)
                               "file"));
 }
 
-}  // namespace
-
+/// Returns the token in the metadata "authorization: Bearer TOKEN", or an empty string.
 std::string BearerToken(const grpc::CallbackServerContext& context) {
   const auto shown = context.client_metadata().find("authorization");
   if (shown == context.client_metadata().end()) return "";
@@ -77,6 +76,8 @@ std::string BearerToken(const grpc::CallbackServerContext& context) {
   if (!absl::StartsWithIgnoreCase(value, kScheme)) return "";
   return std::string(value.substr(kScheme.size()));
 }
+
+}  // namespace
 
 AccessControl::AccessControl(AccessTable table, const Clock& clock, LimitedLog::Sink log)
     : table_(std::make_shared<const AccessTable>(std::move(table))),

@@ -17,10 +17,6 @@
 
 namespace carillon {
 
-/// Returns the token that a caller sends in the metadata "authorization" as "Bearer TOKEN", or an
-/// empty string if the caller sends no token.
-std::string BearerToken(const grpc::CallbackServerContext& context);
-
 /// Decides which calls each caller may make. Callers through a Unix socket have every role. Callers
 /// over TCP have the roles that the table gives to their token or certificate. Refusals are logged.
 /// Safe from every thread.

@@ -15,7 +15,7 @@ constexpr const char* kServices[] = {
     "carillon.v1.AdminService",      "carillon.v1.AudioService",
     "carillon.v1.ContactService",    "carillon.v1.DecompositionService",
     "carillon.v1.ModalModelService", "carillon.v1.SceneService",
-    "carillon.v1.ServerService",     "carillon.worker.v1.JobRunService"};
+    "carillon.v1.ServerService"};
 
 std::map<std::string, std::string, std::less<>> NamesOfCalls() {
   std::map<std::string, std::string, std::less<>> names;
