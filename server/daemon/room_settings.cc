@@ -8,7 +8,6 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/audio_device/open_device.h"
-#include "server/metrics/metrics_address.h"
 
 namespace carillon {
 namespace {
@@ -77,9 +76,6 @@ absl::Status CheckRooms(const CommandLine& command) {
     RETURN_IF_ERROR(at("precompute", CheckLocalExecutor(LocalExecutorOptionsOf(options))));
   }
   RETURN_IF_ERROR(at("audio_device", CheckDevice(options.audio_device)));
-  if (!options.metrics_address.empty()) {
-    RETURN_IF_ERROR(at("metrics", CheckMetricsAddress(options.metrics_address)));
-  }
   const absl::Status api = ApiServer::Check(ApiSettingsOf(options), options.sample_rate_hz);
   return at(ApiSetting(ToErrorInfo(api).reason()), api);
 }

@@ -17,8 +17,8 @@ ApiSettings ApiSettingsOf(const Options& options);
 
 /// Checks what the rooms will make of the settings, as far as this opens no device, listens at no
 /// address and changes nothing. An error names the line of the configuration file that gives the
-/// setting. Errors: those of DataDirectory::Check, CheckLocalExecutor, CheckDevice,
-/// CheckMetricsAddress and ApiServer::Check.
+/// setting. Errors: those of DataDirectory::Check, CheckLocalExecutor, CheckDevice and
+/// ApiServer::Check.
 absl::Status CheckRooms(const CommandLine& command);
 
 }  // namespace carillon

@@ -10,8 +10,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/status_macros.h"
-#include "server/metrics/metrics_address.h"
 
 namespace carillon {
 namespace {
@@ -48,14 +46,8 @@ class Readings final : public prometheus::Collectable {
 
 class ExposedMetrics final : public MetricsServer {
  public:
-  /// 32 threads close 128 connections a second that say nothing. The system queues as many
-  /// connections as they close within 10 s, the time for which Prometheus usually waits; it takes
-  /// others only when their clients try again, which they do after seconds.
   ExposedMetrics(const std::string& address, Read read)
-      : readings_(std::make_shared<Readings>(std::move(read))),
-        exposer_(std::vector<std::string>{"listening_ports", address, "num_threads", "32",
-                                          "request_timeout_ms", "250", "listen_backlog", "1280",
-                                          "enable_keep_alive", "no"}) {
+      : readings_(std::make_shared<Readings>(std::move(read))), exposer_(address) {
     exposer_.RegisterCollectable(readings_);
   }
 
@@ -68,13 +60,14 @@ class ExposedMetrics final : public MetricsServer {
 
 absl::StatusOr<std::unique_ptr<MetricsServer>> MetricsServer::Start(const std::string& address,
                                                                     Read read) {
-  ASSIGN_OR_RETURN(const std::string numeric, FindMetricsAddress(address));
   try {
-    return std::make_unique<ExposedMetrics>(numeric, std::move(read));
+    return std::make_unique<ExposedMetrics>(address, std::move(read));
   } catch (const std::exception& error) {
-    return Refusal(absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
-                   absl::StrCat("cannot serve metrics on ", address, ": ", error.what(),
-                                "; choose another --metrics"));
+    return Refusal(
+        absl::StatusCode::kFailedPrecondition, "LISTEN_FAILED",
+        absl::StrCat("cannot serve metrics on ", address, ": ", error.what(),
+                     "; let --metrics name a free port at an IPv4 address of this machine, "
+                     "such as 127.0.0.1:9464"));
   }
 }
 
