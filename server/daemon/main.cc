@@ -30,7 +30,6 @@
 #include "server/daemon/daemon_log.h"
 #include "server/daemon/daemon_metrics.h"
 #include "server/daemon/data_directory.h"
-#include "server/daemon/memory_limits.h"
 #include "server/daemon/options.h"
 #include "server/daemon/room_settings.h"
 #include "server/daemon/stop_signals.h"
@@ -199,7 +198,6 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   // systemd listens.
   if (std::getenv("NOTIFY_SOCKET") != nullptr) reports.work = [&] { watchdog.Report(); };
   WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo, reports);
-  ExpectEnd();
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");
   rooms.output.FadeOut();
@@ -209,7 +207,6 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 /// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
 /// destroyed before them.
 absl::Status Run(Options options, const ReadOptions& read_options, const StopGuard& guard) {
-  RETURN_IF_ERROR(CheckLimits());
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
@@ -317,7 +314,6 @@ absl::Status RunDatabaseCommand(const CommandLine& command) {
 }
 
 int Main(int argc, char* const* argv) {
-  ReportUncaughtExceptions();
   SetUpLog();
   const ReadOptions read_options = [=] { return ReadCommandLine(argc, argv, kVersion); };
   const absl::StatusOr<CommandLine> command = read_options();

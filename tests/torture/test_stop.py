@@ -149,39 +149,6 @@ class StopTest(torture.ServedTest):
         blocked = int(status.partition("SigBlk:")[2].split()[0], 16)
         return bool(blocked >> (signal.SIGTERM - 1) & 1)
 
-    def test_a_start_without_memory_says_so_and_ends(self):
-        for limit_kib in (250_000, 300_000, 400_000):
-            with self.subTest(limit_kib=limit_kib):
-                ended = subprocess.run(
-                    ["prlimit", f"--as={limit_kib << 10}", BIN / "carillond", "--data-dir", self.folder / "data",
-                     "--listen", f"unix:{self.folder}/s", "--audio-device", "null"],
-                    capture_output=True, text=True, check=False, timeout=STOP_S)
-                self.assertEqual(ended.returncode, 1, ended.stderr)
-                self.assertIn("SERVER_OUT_OF_MEMORY: ", ended.stderr)
-
-    def start_with_descriptors(self, soft, hard):
-        process = subprocess.Popen(
-            ["prlimit", f"--nofile={soft}:{hard}", BIN / "carillond", "--data-dir", self.folder / "data",
-             "--listen", f"unix:{self.folder}/s", "--audio-device", "null"],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(process.kill)
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.stdout.close)
-        return process
-
-    def test_a_start_with_too_few_descriptors_says_how_many_it_needs(self):
-        for count in (10, 20, 63):
-            with self.subTest(count=count):
-                process = self.start_with_descriptors(count, count)
-                self.assertEqual(process.wait(STOP_S), 1)
-                self.assertRegex(process.stderr.read(), f"TOO_FEW_DESCRIPTORS: .*{count} descriptors, and needs 64")
-        for limits in ((64, 64), (20, 4096)):
-            with self.subTest(limits=limits):
-                process = self.start_with_descriptors(*limits)
-                self.assertRegex(process.stdout.readline(), "listening on")
-                process.terminate()
-                self.assertEqual(process.wait(STOP_S), 0)
-
     def test_frames_missed_while_it_was_stopped_are_counted(self):
         self.serve("--audio-device", f"file:{self.folder}/sound.wav")
         before = self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
