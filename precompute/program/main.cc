@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -25,7 +24,6 @@
 #include "precompute/pipeline/remedies.h"
 #include "precompute/pipeline/worker_request.h"
 #include "precompute/program/command_line.h"
-#include "precompute/program/confine_writes.h"
 #include "precompute/program/json_report.h"
 #include "precompute/program/progress_bar.h"
 #include "precompute/program/progress_reporter.h"
@@ -111,22 +109,6 @@ int Refuse(const absl::Status& status, bool json, const WorkerEvents& events) {
   return EXIT_FAILURE;
 }
 
-/// Opens the standard streams that are closed, because files opened later would take their numbers.
-/// A standard output that was closed refuses every byte.
-void OpenStandardStreams() {
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (fcntl(stream, F_GETFD) >= 0) continue;
-    if (open(stream == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR) != stream) std::abort();
-  }
-}
-
-/// Returns the paths of all files that the program may write.
-std::vector<std::string> FilesToWrite(const CommandLine& asked) {
-  std::vector<std::string> files{asked.output};
-  if (!asked.transfer_output.empty()) files.push_back(asked.transfer_output);
-  return files;
-}
-
 /// Flushes standard output. Returns the exit status of the program.
 int FinishOutput() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return EXIT_SUCCESS;
@@ -138,8 +120,6 @@ int FinishOutput() {
 }
 
 int Run(CommandLine asked) {
-  // Whoever takes events runs the program with meshes of others.
-  if (asked.event_descriptor >= 0) ConfineWrites(FilesToWrite(asked));
   SetThreadCount(asked.thread_count);
   const WorkerEvents events(asked.event_descriptor);
   absl::StatusOr<Result> result = absl::UnknownError("not computed");
@@ -173,7 +153,6 @@ void RestartWithFastBlas(char** argv) {
 }
 
 int Main(int argc, char** argv) {
-  OpenStandardStreams();
   RestartWithFastBlas(argv);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGCHLD, SIG_DFL);  // the ends of meshing processes are lost while it is ignored
