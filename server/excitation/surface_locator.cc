@@ -6,11 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <latch>
 #include <limits>
 #include <optional>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,9 +19,6 @@
 
 namespace carillon {
 namespace {
-
-/// The number of threads for which there must be room before Embree is called.
-constexpr size_t kProbedThreadCount = 4;
 
 absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED", message);
@@ -61,26 +55,8 @@ absl::Status Check(const LocatorSurfaces& surfaces) {
 absl::Status OutOfMemory(const LocatorSurfaces& surfaces) {
   return Refusal(
       absl::StatusCode::kResourceExhausted, "SERVER_OUT_OF_MEMORY",
-      absl::StrCat("there is too little memory, or there are too few threads, for the "
-                   "index of ",
-                   surfaces.triangles.size(), " triangles: ask for less, or give the daemon more"));
-}
-
-/// Returns whether the system gives this process a few threads. The library of tasks within Embree
-/// begins threads of its own now and then, and ends the process if it gets none.
-bool SystemGivesThreads() {
-  std::latch done(1);
-  std::vector<std::thread> threads;
-  bool given = true;
-  try {
-    threads.reserve(kProbedThreadCount);
-    while (threads.size() < kProbedThreadCount) threads.emplace_back([&done] { done.wait(); });
-  } catch (const std::system_error&) {
-    given = false;
-  }
-  done.count_down();
-  for (std::thread& thread : threads) thread.join();
-  return given;
+      absl::StrCat("there is too little memory for the index of ", surfaces.triangles.size(),
+                   " triangles: ask for less, or give the daemon more"));
 }
 
 Point ToPoint(const std::array<float, 3>& vertex) { return {vertex[0], vertex[1], vertex[2]}; }
@@ -272,7 +248,6 @@ SurfaceLocator::~SurfaceLocator() = default;
 absl::StatusOr<std::unique_ptr<SurfaceLocator>> SurfaceLocator::Make(
     const LocatorSurfaces& surfaces) {
   RETURN_IF_ERROR(Check(surfaces));
-  if (!SystemGivesThreads()) return OutOfMemory(surfaces);
   auto index = std::make_unique<Index>(surfaces);
   if (const RTCError error = rtcGetDeviceError(index->device); error != RTC_ERROR_NONE) {
     if (error == RTC_ERROR_OUT_OF_MEMORY) return OutOfMemory(surfaces);
