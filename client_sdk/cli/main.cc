@@ -9,14 +9,8 @@
 #include <iostream>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
-#include "absl/strings/str_split.h"
-#include "absl/strings/string_view.h"
-#include "absl/strings/strip.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/doctor_command.h"
 #include "client_sdk/cli/commands/program.h"
@@ -257,15 +251,6 @@ void AddProgramOptions(CLI::App& app, Program& program) {
       "command line is wrong; 3 if no daemon answers.");
 }
 
-/// Returns the option of this name that the program has, or the command that the command line
-/// chose. Returns null if neither has it.
-const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
-  if (const CLI::Option* option = app.get_option_no_throw(name)) return option;
-  const std::vector<const CLI::App*> chosen =
-      app.get_subcommands([](const CLI::App* command) { return command->count() > 0; });
-  return chosen.empty() ? nullptr : FindOption(*chosen.front(), name);
-}
-
 void AddCommands(CLI::App& app, Program& program) {
   AddStatus(app, program);
   AddDoctor(app, program);
@@ -286,54 +271,6 @@ void AddCommands(CLI::App& app, Program& program) {
   AddExample(app, program);
 }
 
-/// Adds the names of the required options that the chosen commands lack.
-void AddMissing(const CLI::App& app, std::vector<std::string>& names) {
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->get_required() && option->count() == 0) names.push_back(option->get_name());
-  }
-  for (const CLI::App* command : app.get_subcommands()) AddMissing(*command, names);
-}
-
-/// Returns the text of a value that its option cannot read, and says what the option takes.
-std::string ConversionText(const CLI::App& app, const CLI::ParseError& error) {
-  absl::string_view text = error.what();
-  absl::ConsumePrefix(&text, "Could not convert: ");
-  const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits(" = ", 1));
-  const CLI::Option* option = parts.size() == 2 ? FindOption(app, parts[0]) : nullptr;
-  if (option == nullptr) return error.what();
-  // A vector with too few numbers takes the next option for one.
-  const std::string given = parts[1].substr(0, parts[1].find(",--"));
-  return absl::StrCat(parts[0], " cannot be ", given, ": ", option->get_description());
-}
-
-/// Returns the names of the commands one of which must follow the chosen ones.
-std::string NextCommands(const CLI::App& app) {
-  const CLI::App* last = &app;
-  while (!last->get_subcommands().empty()) last = last->get_subcommands().back();
-  const std::vector<const CLI::App*> commands =
-      last->get_subcommands([](const CLI::App* /*command*/) { return true; });
-  const auto name = [](std::string* text, const CLI::App* command) {
-    absl::StrAppend(text, command->get_name());
-  };
-  return absl::StrJoin(commands, ", ", name);
-}
-
-/// Returns the text of a usage error. If required options are missing, the text names them all.
-std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
-  if (dynamic_cast<const CLI::ConversionError*>(&error) != nullptr) {
-    return absl::StrCat(ConversionText(app, error), "\nRun with --help for more information.");
-  }
-  std::vector<std::string> missing;
-  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) AddMissing(app, missing);
-  std::string what = missing.size() > 1
-                         ? absl::StrCat(absl::StrJoin(missing, ", "), " are required")
-                         : error.what();
-  if (what == "A subcommand is required") {
-    what = absl::StrCat("a command is missing, one of ", NextCommands(app));
-  }
-  return absl::StrCat(what, "\nRun with --help for more information.");
-}
-
 /// Prints what is wrong with the command line to stderr, and with --json its first line to stdout
 /// as an error. Returns the exit code.
 int ReportMistake(const std::string& what, int argc, char** argv) {
@@ -351,7 +288,6 @@ int ReportMistake(const std::string& what, int argc, char** argv) {
 int Finish(int code) { return code == kDone ? Report(FlushOutput()) : code; }
 
 int Main(int argc, char** argv) {
-  OpenStandardStreams();
   Program program;
   CLI::App app("Controls the daemon carillond, which makes rigid-body simulations audible.",
                "carillon");
@@ -362,7 +298,9 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const std::string unknown = UnknownWord(app, argc, argv);
     if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
-    return ReportMistake(unknown.empty() ? MistakeText(app, error) : unknown, argc, argv);
+    return ReportMistake(absl::StrCat(unknown.empty() ? error.what() : unknown,
+                                      "\nRun with --help for more information."),
+                         argc, argv);
   }
   if (!IsServerAddress(program.server)) {
     return ReportMistake(

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/output/output.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
@@ -16,14 +13,6 @@
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
-
-void OpenStandardStreams() {
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (fcntl(stream, F_GETFD) >= 0) continue;
-    // The lowest free number is that of the stream. A file that is open for reading refuses output.
-    (void)open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_RDWR);
-  }
-}
 
 absl::Status FlushOutput() {
   const bool flushed = std::fflush(stdout) == 0;

@@ -16,10 +16,6 @@ namespace carillon::cli {
 /// Exit codes of the program.
 enum ExitCode { kDone = 0, kRefused = 1, kUsage = 2, kNoServer = 3 };
 
-/// Opens the standard streams that are closed, because files and sockets opened later would take
-/// their numbers. Writing to a stdout that was closed fails.
-void OpenStandardStreams();
-
 /// Flushes stdout. Errors: Internal (OUTPUT_NOT_WRITABLE: a part of the output is lost).
 absl::Status FlushOutput();
 
