@@ -5,19 +5,14 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
-#include "proto/cpp/model_format.h"
 #include "proto/cpp/status_macros.h"
-#include "server/base/xxh3.h"
 
 namespace carillon {
 namespace {
@@ -38,30 +33,6 @@ absl::Status TooLong(uint32_t byte_count) {
 }
 
 template <typename Vector>
-std::string_view Bytes(const Vector& values) {
-  return {reinterpret_cast<const char*>(values.data()),
-          values.size() * sizeof(typename Vector::value_type)};
-}
-
-// The numbers of each of kModelArrays.
-std::array<std::string_view, kModelArrayCount> Fields(const ModalModel& model,
-                                                      const std::vector<double>& residuals) {
-  return {Bytes(model.eigenvalues),    Bytes(residuals),
-          Bytes(model.couplings),      Bytes(model.vertices),
-          Bytes(model.triangles),      Bytes(model.given_triangle),
-          Bytes(model.given_vertices), Bytes(model.given_triangles),
-          Bytes(model.shapes)};
-}
-
-ModelSizes SizesOf(const ModalModel& model) {
-  return {.modes = model.eigenvalues.size(),
-          .vertices = model.vertices.size(),
-          .triangles = model.triangles.size(),
-          .given_vertices = model.given_vertices.size(),
-          .given_triangles = model.given_triangles.size()};
-}
-
-template <typename Vector>
 char* Resize(Vector& values, uint64_t count) {
   values.resize(count);
   return reinterpret_cast<char*>(values.data());
@@ -79,14 +50,6 @@ char* Destination(ModalModel& model, const v1::ArrayDescriptor& array) {
   if (array.name() == "given_triangles") return Resize(model.given_triangles, count);
   if (array.name() == "shapes") return Resize(model.shapes, count * 3 * array.shape(2));
   return nullptr;
-}
-
-v1::ModalModelRecord HeaderRecord(const ModelSizes& sizes, v1::ModalModelHeader header) {
-  header.clear_arrays();
-  for (const ArraySpec& spec : kModelArrays) *header.add_arrays() = DescribeArray(spec, sizes);
-  v1::ModalModelRecord record;
-  *record.mutable_header() = std::move(header);
-  return record;
 }
 
 }  // namespace
@@ -191,39 +154,6 @@ absl::StatusOr<ModalModel> ModelDecoder::Finish(const std::string& digest) {
   RETURN_IF_ERROR(checker_.Finish());
   model_.digest = digest;
   return std::move(model_);
-}
-
-absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
-                         const std::vector<double>& residuals,
-                         absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
-  header.set_mode_count(static_cast<uint32_t>(model.mode_count()));
-  const auto fields = Fields(model, residuals);
-  absl::Status status = sink(HeaderRecord(SizesOf(model), std::move(header)));
-  for (size_t i = 0; status.ok() && i < fields.size(); ++i) {
-    const std::string_view bytes = fields[i];
-    for (size_t offset = 0; status.ok() && offset < bytes.size(); offset += kMaxModelChunkBytes) {
-      const std::string_view data = bytes.substr(offset, kMaxModelChunkBytes);
-      v1::ModalModelRecord record;
-      v1::ModalModelChunk& chunk = *record.mutable_chunk();
-      chunk.set_array(static_cast<uint32_t>(i));
-      chunk.set_offset(offset);
-      chunk.set_data(data.data(), data.size());
-      chunk.set_xxh3(Xxh3(data));
-      status = sink(record);
-    }
-  }
-  return status;
-}
-
-absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
-                                         const std::string& digest) {
-  ASSIGN_OR_RETURN(ModelFileReader reader, ModelFileReader::Open(file));
-  ModelDecoder decoder;
-  while (true) {
-    ASSIGN_OR_RETURN(const auto record, reader.Next());
-    if (!record.has_value()) return decoder.Finish(digest);
-    RETURN_IF_ERROR(decoder.Append(*record));
-  }
 }
 
 }  // namespace carillon

@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model.pb.h"
@@ -66,17 +65,5 @@ class ModelDecoder {
   std::vector<char*>
       destinations_;  // address for each array's first byte; null if the array is not kept
 };
-
-/// Hands the records of `model` to `sink` in order. Stops at the first error of `sink` and returns
-/// it. `header` supplies the fields that the model lacks; its arrays and mode count are filled in.
-/// `residuals` are those of the #m eigenvalues.
-absl::Status EncodeModel(const ModalModel& model, v1::ModalModelHeader header,
-                         const std::vector<double>& residuals,
-                         absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
-
-/// Reads the model of a file. Errors: NotFound (FILE_NOT_FOUND), InvalidArgument
-/// (MODAL_MODEL_MALFORMED), DataLoss (MODAL_MODEL_CORRUPT).
-absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
-                                         const std::string& digest);
 
 }  // namespace carillon

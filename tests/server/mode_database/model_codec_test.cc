@@ -55,12 +55,6 @@ TEST(ModelCodec, GivesBackEveryNumberOfAModelOfSeveralChunks) {
   EXPECT_EQ(read->shapes, model.shapes);
 }
 
-TEST(ModelCodec, WritesNoChunkLargerThanAMebibyte) {
-  for (const v1::ModalModelRecord& record : SampleRecords(SampleModel(100, 1000))) {
-    EXPECT_LE(record.chunk().data().size(), 1U << 20U);
-  }
-}
-
 TEST(ModelCodec, RefusesAFileCutShortAtAnyByte) {
   const TemporaryFolder folder;
   WriteRecords(folder / "whole", SampleRecords(SampleModel(2, 4)));

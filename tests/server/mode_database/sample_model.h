@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
-#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "proto/cpp/model_format.h"
+#include "server/base/xxh3.h"
 #include "server/mode_database/codec/modal_model.h"
 #include "server/mode_database/codec/model_codec.h"
 
@@ -65,13 +69,51 @@ inline v1::ModalModelHeader SampleHeader(const ModalModel& model) {
 
 /// Its records, in order.
 inline std::vector<v1::ModalModelRecord> SampleRecords(const ModalModel& model) {
-  std::vector<v1::ModalModelRecord> records;
   const std::vector<double> residuals(model.mode_count(), 1e-9);
-  EncodeModel(model, SampleHeader(model), residuals, [&](const v1::ModalModelRecord& record) {
-    records.push_back(record);
-    return absl::OkStatus();
-  }).IgnoreError();
+  const auto bytes = [](const auto& values) {
+    return absl::string_view(reinterpret_cast<const char*>(values.data()),
+                             values.size() * sizeof(values[0]));
+  };
+  const std::array<absl::string_view, kModelArrayCount> arrays = {
+      bytes(model.eigenvalues),    bytes(residuals),
+      bytes(model.couplings),      bytes(model.vertices),
+      bytes(model.triangles),      bytes(model.given_triangle),
+      bytes(model.given_vertices), bytes(model.given_triangles),
+      bytes(model.shapes)};
+  std::vector<v1::ModalModelRecord> records(1);
+  v1::ModalModelHeader& header = *records[0].mutable_header();
+  header = SampleHeader(model);
+  header.set_mode_count(static_cast<uint32_t>(model.mode_count()));
+  const ModelSizes sizes{.modes = model.mode_count(),
+                         .vertices = model.vertices.size(),
+                         .triangles = model.triangles.size(),
+                         .given_vertices = model.given_vertices.size(),
+                         .given_triangles = model.given_triangles.size()};
+  for (const ArraySpec& spec : kModelArrays) *header.add_arrays() = DescribeArray(spec, sizes);
+  for (uint32_t i = 0; i < arrays.size(); ++i) {
+    for (size_t at = 0; at < arrays[i].size(); at += kMaxModelChunkBytes) {
+      v1::ModalModelChunk& chunk = *records.emplace_back().mutable_chunk();
+      chunk.set_array(i);
+      chunk.set_offset(at);
+      chunk.set_data(std::string(arrays[i].substr(at, kMaxModelChunkBytes)));
+      chunk.set_xxh3(Xxh3(chunk.data()));
+    }
+  }
   return records;
+}
+
+/// Reads the model of a file, or returns the error of the codec.
+inline absl::StatusOr<ModalModel> ReadModelFile(const std::filesystem::path& file,
+                                                const std::string& digest) {
+  absl::StatusOr<ModelFileReader> reader = ModelFileReader::Open(file);
+  if (!reader.ok()) return reader.status();
+  ModelDecoder decoder;
+  while (true) {
+    const auto record = reader->Next();
+    if (!record.ok()) return record.status();
+    if (!record->has_value()) return decoder.Finish(digest);
+    if (absl::Status status = decoder.Append(**record); !status.ok()) return status;
+  }
 }
 
 inline void WriteRecords(const std::filesystem::path& file,
