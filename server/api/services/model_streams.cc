@@ -20,9 +20,9 @@
 #include "server/api/call/read_call.h"
 #include "server/api/call/send_call.h"
 #include "server/api/convert/resource_name.h"
-#include "server/api/services/transfer_spool.h"
 #include "server/mode_database/codec/imported_figures.h"
 #include "server/mode_database/codec/modal_model.h"
+#include "server/mode_database/codec/transfer_codec.h"
 #include "server/mode_database/database.h"
 
 namespace carillon {
@@ -64,13 +64,12 @@ class ModelSink {
   explicit ModelSink(ImportTarget target)
       : database_(&target.database),
         replacing_(target.replacing),
-        log_event_(std::move(target.log_event)),
-        transfers_(target.database.database()) {}
+        log_event_(std::move(target.log_event)) {}
 
   absl::Status Append(const v1::ImportModalModelRequest& request) {
     RETURN_IF_ERROR(Begin(request));
     if (request.record().record_case() == v1::ModalModelRecord::kTransfer) {
-      return transfers_.Append(request.record().transfer());
+      return AppendTransfer(request.record().transfer());
     }
     if (request.record().has_header()) {
       RETURN_IF_ERROR(CheckFigures(request.record().header()));
@@ -84,8 +83,11 @@ class ModelSink {
                      "no record was sent; send the header, then every chunk");
     }
     // All transfers are checked before anything is stored.
-    RETURN_IF_ERROR(transfers_.ForEach(
-        [](const StoredTransfer& transfer) { return CheckFigures(transfer.header()); }));
+    std::vector<StoredTransfer> transfers;
+    for (std::string& bytes : transfers_) {
+      ASSIGN_OR_RETURN(transfers.emplace_back(), StoredTransfer::Parse(std::move(bytes)));
+      RETURN_IF_ERROR(CheckFigures(transfers.back().header()));
+    }
     ASSIGN_OR_RETURN(const ModelSummary summary, import_->Finish());
     if (!import_->kept()) {
       log_event_(Event("model_imported")
@@ -96,9 +98,9 @@ class ModelSink {
     }
     // A model that this call has stored takes any transfer.
     const Replacing replacing = import_->kept() ? replacing_ : Replacing::kAlways;
-    RETURN_IF_ERROR(transfers_.ForEach([&](const StoredTransfer& transfer) {
-      return database_->transfers().Put(summary.digest, transfer, replacing).status();
-    }));
+    for (const StoredTransfer& transfer : transfers) {
+      RETURN_IF_ERROR(database_->transfers().Put(summary.digest, transfer, replacing).status());
+    }
     *response.mutable_modal_model() = ToProto(summary);
     return absl::OkStatus();
   }
@@ -113,11 +115,32 @@ class ModelSink {
     return absl::OkStatus();
   }
 
+  /// Appends a record of a transfer. A header begins the next transfer.
+  absl::Status AppendTransfer(const std::string& serialized) {
+    v1::TransferRecord record;
+    const bool parsed = record.ParseFromString(serialized);
+    if (!parsed || (transfers_.empty() && !record.has_header())) {
+      return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
+                     "a record of a transfer cannot be read, or comes before its header: export the "
+                     "model again");
+    }
+    if (record.has_header()) transfers_.emplace_back();
+    transfers_.back() += Delimited(record);
+    transfer_byte_count_ += serialized.size();
+    if (transfer_byte_count_ <= kMostTransferBytes) return absl::OkStatus();
+    return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
+                   absl::StrCat("a model is imported with at most ", kMostTransferBytes >> 20U,
+                                " MiB of transfers: import it without them, and compute them here"));
+  }
+
+  static constexpr size_t kMostTransferBytes = size_t{256} << 20U;
+
   ModeDatabase* database_;
   Replacing replacing_;
   EventSink log_event_;
   std::optional<ModelImport> import_;
-  TransferSpool transfers_;
+  std::vector<std::string> transfers_;  // records in protobuf's delimited form
+  size_t transfer_byte_count_ = 0;
 };
 
 /// Sends a model, then its transfers, record by record.
