@@ -40,8 +40,6 @@ constexpr size_t kDescriptorsOfConnection = 2;
 /// Descriptors that the database, decompositions and devices may need, apart from the connections.
 constexpr size_t kOwnDescriptorCount = 256;
 constexpr int kBacklog = 1024;
-/// This part of the places is for processes and addresses with few connections.
-constexpr size_t kKeptPart = 16;
 /// Pause after an accept that failed for lack of descriptors or memory.
 constexpr std::chrono::milliseconds kPause(50);
 constexpr size_t kEventsAtOnce = 64;
@@ -126,7 +124,7 @@ void ConnectionGate::Close() {
   eventfd_write(stop_, 1);
   if (thread_.joinable()) thread_.join();
   // Before the sockets are closed, their inodes belong to no other file.
-  for (const WatchedFile& watched : socket_files_) watched.file.Remove();
+  for (const SocketFile& file : socket_files_) file.Remove();
   for (const Door& door : doors_) close(door.socket);
   doors_.clear();
   socket_files_.clear();
@@ -149,7 +147,7 @@ absl::Status ConnectionGate::ListenUnix(const ListenAddress& address, Connection
   doors_.push_back({bound, &taker});
   std::optional<SocketFile> file = SocketFile::Remember(address.socket_path);
   if (!file) return Failed(address, errno);
-  socket_files_.push_back({.file = *std::move(file)});
+  socket_files_.push_back(*std::move(file));
   if (chmod(address.socket_path.c_str(), mode) != 0) return Failed(address, errno);
   return absl::OkStatus();
 }
@@ -203,17 +201,6 @@ void ConnectionGate::Run() {
     }
     // Not before, because a new duplicate may get the number of one that has ended.
     for (const Door* door : ready) Accept(*door);
-  }
-}
-
-void ConnectionGate::LookAtSocketFiles() {
-  if (log_ == nullptr) return;
-  for (WatchedFile& watched : socket_files_) {
-    const bool was_in_place = std::exchange(watched.was_in_place, watched.file.IsInPlace());
-    if (!was_in_place || watched.was_in_place) continue;
-    log_->Warn(absl::StrCat("somebody removed or replaced the socket ", watched.file.path(),
-                            ", so that new clients do not find this daemon: put the file back, or "
-                            "restart the daemon; open connections go on"));
   }
 }
 
@@ -309,15 +296,9 @@ std::string ConnectionGate::WhyNoPlace(const std::string& source) const {
   const auto counted = counts_.find(source);
   const size_t count = counted == counts_.end() ? 0 : counted->second;
   const size_t most = ClientLimits::ShareOf(max_connection_count_, client_share_);
-  if (client_share_ < 1 && count >= most) {
-    return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
-                        max_connection_count_);
-  }
-  const size_t kept = max_connection_count_ / kKeptPart;
-  if (all < max_connection_count_ - kept || count < kFewConnections) return "";
-  return absl::StrCat("it has ", count, " already, and the last ", kept, " of ",
-                      max_connection_count_, " places are for clients with fewer than ",
-                      kFewConnections);
+  if (client_share_ >= 1 || count < most) return "";
+  return absl::StrCat("it has ", count, " already, its share (--client-share) of ",
+                      max_connection_count_);
 }
 
 void ConnectionGate::WarnOnce(const std::string& subject, const std::string& line) {

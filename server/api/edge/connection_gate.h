@@ -56,10 +56,6 @@ class ConnectionGate {
   /// the same address.
   static constexpr std::chrono::seconds kLoopbackRefusal{1};
 
-  /// The last sixteenth of the places is for processes and addresses with fewer connections than
-  /// this number, so that a new process or address finds a place.
-  static constexpr size_t kFewConnections = 8;
-
   static constexpr size_t kMostRefused = 16;
 
   /// A process (Unix) or address (TCP) may have the share `client_share`, as ClientLimits has it,
@@ -85,10 +81,6 @@ class ConnectionGate {
   /// Joins the thread, and closes and removes the listening sockets. Connections that were taken
   /// stay open.
   void Close();
-
-  /// Logs which socket files somebody has removed or replaced since the last call. Only one thread
-  /// may call it, between Open and Close.
-  void LookAtSocketFiles();
 
   /// Returns whether the connection with this name (ServerContext::peer) is open. Any thread may
   /// call it.
@@ -122,11 +114,6 @@ class ConnectionGate {
     int socket;
     ConnectionTaker* taker;
   };
-  /// A Unix socket that the gate has bound.
-  struct WatchedFile {
-    SocketFile file;
-    bool was_in_place = true;  ///< at the last look
-  };
   struct Connection {
     int descriptor;         ///< the gate's own, a duplicate of gRPC's
     std::string refusal{};  ///< empty if the connection has a place
@@ -157,7 +144,7 @@ class ConnectionGate {
   SourceFunction& source_of_;
   std::vector<std::unique_ptr<ConnectionTaker>> takers_;
   std::vector<Door> doors_;
-  std::vector<WatchedFile> socket_files_;
+  std::vector<SocketFile> socket_files_;  ///< that the gate has bound
   std::function<void()> on_first_;
   uint64_t accepted_count_ = 0;
   mutable Mutex mutex_;

@@ -34,11 +34,6 @@ absl::StatusOr<std::deque<ListenAddress>> Edge::Parse(const EdgeSettings& settin
                                   " can be reached from the network; say who may do what there: "
                                   "give --access-file"));
     }
-    if (std::ranges::any_of(
-            addresses, [&](const ListenAddress& other) { return IsSameAddress(address, other); })) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_CONFIGURATION",
-                     absl::StrCat("--listen names ", text, " twice: name each address once"));
-    }
     addresses.push_back(std::move(address));
   }
   return addresses;
@@ -114,7 +109,6 @@ void Edge::Watch() {
   while (!closing_) {
     if (FloodGuard::Clock::now() >= next_second) {
       next_second = FloodGuard::Clock::now() + std::chrono::seconds(1);
-      gate_.LookAtSocketFiles();
       each_second_();
     }
     FloodGuard::Clock::duration pause = next_second - FloodGuard::Clock::now();

@@ -97,15 +97,6 @@ std::string ListenAddress::ToString() const {
   return bracket ? absl::StrCat("[", host, "]:", port) : absl::StrCat(host, ":", port);
 }
 
-bool IsSameAddress(const ListenAddress& a, const ListenAddress& b) {
-  if (a.is_unix() != b.is_unix()) return false;
-  if (!a.is_unix()) return a.port != 0 && a.port == b.port && a.host == b.host;
-  const auto whole = [](const std::string& path) {
-    return std::filesystem::absolute(path).lexically_normal();
-  };
-  return whole(a.socket_path) == whole(b.socket_path);
-}
-
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text) {
   absl::string_view path = text;
   if (!absl::ConsumePrefix(&path, "unix:")) return ParseTcp(text);

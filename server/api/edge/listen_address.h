@@ -26,10 +26,6 @@ struct ListenAddress {
   std::string ToString() const;
 };
 
-/// Returns whether both are one address, at which only one socket can listen. Port 0 is another
-/// free port each time.
-bool IsSameAddress(const ListenAddress& a, const ListenAddress& b);
-
 /// Parses an address. Errors: InvalidArgument (INVALID_CONFIGURATION).
 absl::StatusOr<ListenAddress> ParseListenAddress(absl::string_view text);
 

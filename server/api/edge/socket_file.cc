@@ -17,13 +17,10 @@ std::optional<SocketFile> SocketFile::Remember(const std::string& path) {
 SocketFile::SocketFile(std::string path, dev_t device, ino_t inode)
     : path_(std::move(path)), device_(device), inode_(inode) {}
 
-bool SocketFile::IsInPlace() const {
-  struct stat now {};
-  return lstat(path_.c_str(), &now) == 0 && now.st_dev == device_ && now.st_ino == inode_;
-}
-
 void SocketFile::Remove() const {
-  if (IsInPlace()) unlink(path_.c_str());
+  struct stat now {};
+  if (lstat(path_.c_str(), &now) != 0 || now.st_dev != device_ || now.st_ino != inode_) return;
+  unlink(path_.c_str());
 }
 
 }  // namespace carillon

@@ -16,13 +16,8 @@ class SocketFile {
   /// the reason in errno, if the file cannot be seen.
   static std::optional<SocketFile> Remember(const std::string& path);
 
-  /// Returns whether the file at the path is still this socket, so that clients find it.
-  bool IsInPlace() const;
-
   /// Removes the file, unless somebody has put another one in its place.
   void Remove() const;
-
-  const std::string& path() const { return path_; }
 
  private:
   SocketFile(std::string path, dev_t device, ino_t inode);

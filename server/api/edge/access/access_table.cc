@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
@@ -22,7 +21,6 @@ namespace carillon {
 namespace {
 
 constexpr char kUnusable[] = "ACCESS_FILE_UNUSABLE";
-constexpr absl::string_view kByteOrderMark = "\xEF\xBB\xBF";  // in UTF-8
 constexpr std::array kRoles = {Role::kListen, Role::kStrike, Role::kSubmit, Role::kAdminister};
 
 absl::Status WrongLine(absl::string_view why) {
@@ -40,16 +38,6 @@ absl::StatusOr<unsigned> ParseRoles(absl::string_view text) {
     roles |= static_cast<unsigned>(*role);
   }
   return roles;
-}
-
-absl::Status CheckCharacters(absl::string_view line) {
-  const auto* const wrong = std::find_if(line.begin(), line.end(), [](char c) {
-    return c != '\t' && absl::ascii_iscntrl(static_cast<unsigned char>(c));
-  });
-  if (wrong == line.end()) return absl::OkStatus();
-  return WrongLine(absl::StrCat("the line has a control character, byte 0x",
-                                absl::Hex(static_cast<unsigned char>(*wrong), absl::kZeroPad2),
-                                ": remove it"));
 }
 
 bool IsSameDigest(const std::string& a, const std::string& b) {
@@ -84,12 +72,6 @@ AccessTable AccessTable::ForThisMachine() {
 
 absl::StatusOr<AccessTable> AccessTable::Read(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string content, ReadPrivateFile(path, kUnusable));
-  if (absl::StartsWith(content, kByteOrderMark)) {
-    return WrongLine(absl::StrCat(
-        path,
-        " line 1: the file begins with a byte order mark (bytes EF BB BF), which would be "
-        "taken for a part of the first word: save it as UTF-8 without a byte order mark"));
-  }
   AccessTable table;
   EarlierLines earlier;
   int number = 0;
@@ -120,7 +102,6 @@ absl::Status AccessTable::EarlierLines::Check(const std::string& name, unsigned 
 
 absl::Status AccessTable::ReadLine(absl::string_view line, int number, EarlierLines& earlier) {
   if (line.empty() || line.front() == '#') return absl::OkStatus();
-  RETURN_IF_ERROR(CheckCharacters(line));
   const std::vector<std::string> words =
       absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
   if (words.size() < 2) return WrongLine("the line has no roles");
