@@ -31,9 +31,6 @@ constexpr int kTransferNice = 10;
 constexpr size_t kReadBytes =
     256 << 10;  // at a time, so that one flooding worker does not hold all
 constexpr size_t kLogBytes = 4 << 10;
-// Far above one event a second; a worker that writes more is faulty.
-constexpr uint64_t kFreeEventBytes = 1 << 20;
-constexpr uint64_t kEventBytesPerS = 64 << 10;
 // The longest time that counts as silence between two looks at a worker. Where a look comes later
 // than this, the daemon itself waited for a processor.
 constexpr nanoseconds kLongestLook = std::chrono::seconds(1);
@@ -142,19 +139,10 @@ absl::StatusOr<LocalWorker> LocalWorker::Start(PreparedTask prepared, const Work
 }
 
 void LocalWorker::Read(nanoseconds now) {
-  const std::string bytes = event_pipe_.Read(kReadBytes);
-  event_byte_count_ += bytes.size();
   const absl::Status status =
-      events_.Feed(bytes, [&](const worker::v1::WorkerEvent& event) { OnEvent(event, now); });
-  const auto seconds = static_cast<uint64_t>(Seconds(now - started_));
-  if (!status.ok()) {
-    Kill(Verdict::kCrashed, ToErrorInfo(status));
-  } else if (event_byte_count_ > kFreeEventBytes + seconds * kEventBytesPerS) {
-    Kill(Verdict::kCrashed,
-         InternalError("WORKER_CRASHED",
-                       "the decomposing process floods its event pipe: this is a fault "
-                       "in it; report it with the mesh"));
-  }
+      events_.Feed(event_pipe_.Read(kReadBytes),
+                   [&](const worker::v1::WorkerEvent& event) { OnEvent(event, now); });
+  if (!status.ok()) Kill(Verdict::kCrashed, ToErrorInfo(status));
   log_ += error_pipe_.Read(kReadBytes);
   if (log_.size() > kLogBytes) log_.erase(0, log_.size() - kLogBytes);
 }

@@ -133,7 +133,6 @@ class LocalWorker {
   std::chrono::nanoseconds processor_time_{};  // of the process at the last CountSilence
   std::chrono::nanoseconds silence_{};         // since the newest event; see WorkerLimits::stall
   WorkerEventReader events_;
-  uint64_t event_byte_count_ = 0;
   std::string log_;  // the end of the process's standard error
   double fraction_ = 0;
   std::optional<v1::ErrorInfo> reported_;  // error that the worker itself reported
