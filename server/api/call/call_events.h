@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
+#include <string>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
 #include "server/api/edge/access/access_table.h"
 #include "server/base/clock.h"
 #include "server/base/event.h"
 #include "server/base/limited_events.h"
+#include "server/base/mutex.h"
 
 namespace carillon {
 
@@ -14,26 +20,19 @@ namespace carillon {
 class CallEvents {
  public:
   /// `clock` must outlive the object.
-  CallEvents(const Clock& clock, const EventSink& sink);
+  CallEvents(const Clock& clock, EventSink sink) : clock_(clock), sink_(std::move(sink)) {}
 
   /// Logs an event that only administrators can cause.
   void Log(Event event, const Principal& caller) const;
 
-  void LogSubmitted(Event event, const Principal& caller);
-  void LogCancelled(Event event, const Principal& caller);
-  void LogUploaded(Event event, const Principal& caller);
-  void LogImported(Event event, const Principal& caller);
-  void LogUpdated(Event event, const Principal& caller);
-  void LogScene(Event event, const Principal& caller);
+  /// Logs an event that any client can cause.
+  void LogLimited(Event event, const Principal& caller);
 
  private:
+  const Clock& clock_;
   const EventSink sink_;
-  LimitedEvents submitted_;
-  LimitedEvents cancelled_;
-  LimitedEvents uploaded_;
-  LimitedEvents imported_;
-  LimitedEvents updated_;
-  LimitedEvents scenes_;
+  Mutex mutex_;
+  std::map<std::string, LimitedEvents> kinds_ ABSL_GUARDED_BY(mutex_);  ///< by the event's name
 };
 
 }  // namespace carillon

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <optional>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -17,38 +16,34 @@ namespace carillon {
 
 /// Reads requests into a `Sink`, which has Status Append(const Request&) and Status
 /// Finish(Response&). Both functions run on a thread of the pool, because they write to the disk.
-/// A call with bounds ends with CLIENT_IDLE when its client is silent for too long, or sends less
+/// A call ends with CLIENT_IDLE when its client is silent for too long, or sends less
 /// than 8 KiB for each second in which the call has waited for it.
 template <typename Request, typename Response, typename Sink>
 class ReadCall final : public ClientStream<Request>, public IdleCall {
  public:
   ReadCall(grpc::CallbackServerContext& context, Response& response, Sink sink, ThreadPool& pool,
-           std::optional<CallBounds> bounds = std::nullopt)
+           CallBounds bounds)
       : ClientStream<Request>(&pool),
         context_(context),
         response_(response),
         sink_(std::move(sink)),
-        bounds_(std::move(bounds)) {
-    if (bounds_) {
-      wait_.emplace(bounds_->clock);
-      bounds_->idle_calls.Add(*this);
-    }
+        bounds_(std::move(bounds)),
+        wait_(bounds_.clock) {
+    bounds_.idle_calls.Add(*this);
     this->StartReading();
   }
-  ~ReadCall() override {
-    if (bounds_) bounds_->idle_calls.Remove(*this);
-  }
+  ~ReadCall() override { bounds_.idle_calls.Remove(*this); }
 
   void EndIfIdle(std::chrono::nanoseconds limit) override {
     const double limit_s = std::chrono::duration<double>(limit).count();
-    if (wait_->EndIfLonger(limit)) {
+    if (wait_.EndIfLonger(limit)) {
       return this->End(
           Refusal(absl::StatusCode::kDeadlineExceeded, "CLIENT_IDLE",
                   absl::StrCat("nothing was sent for ", limit_s,
                                " s, and nothing was stored: send it again without pauses")));
     }
     const std::chrono::seconds earned(byte_count_ / kLeastBytesPerSecond);
-    if (!wait_->EndIfAllLonger(limit + earned)) return;
+    if (!wait_.EndIfAllLonger(limit + earned)) return;
     this->End(Refusal(absl::StatusCode::kDeadlineExceeded, "CLIENT_IDLE",
                       absl::StrCat("it took over ", limit_s,
                                    " s longer than at 8 KiB a second, and nothing was stored: "
@@ -63,11 +58,11 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   absl::Status Take(const Request& request) override {
     byte_count_ += request.ByteSizeLong();
     absl::Status status = sink_.Append(request);
-    if (status.ok() && wait_) wait_->Begin();
+    if (status.ok()) wait_.Begin();
     return status;
   }
 
-  bool GoesOn() override { return !wait_ || wait_->Resume(); }
+  bool GoesOn() override { return wait_.Resume(); }
 
   void AllRead() override {
     if (gone()) return this->End(absl::CancelledError("the client has gone"));
@@ -77,8 +72,8 @@ class ReadCall final : public ClientStream<Request>, public IdleCall {
   grpc::CallbackServerContext& context_;
   Response& response_;
   Sink sink_;
-  std::optional<CallBounds> bounds_;
-  std::optional<ClientWait> wait_;
+  CallBounds bounds_;
+  ClientWait wait_;
   std::atomic<uint64_t> byte_count_{0};
 };
 

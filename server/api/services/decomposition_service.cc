@@ -181,7 +181,7 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
         const v1::JobState state = response->job().state();
         const bool ended = state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_FAILED;
         if (HasEnded(before) || ended) return absl::OkStatus();
-        writing_.events.LogCancelled(
+        writing_.events.LogLimited(
             Event("job_cancelled").With("job", before.name()).WithSome("label", before.label()),
             caller);
         return absl::OkStatus();

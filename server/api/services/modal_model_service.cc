@@ -72,7 +72,7 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::UploadMeshRaw(
               [&](const Principal& caller, ClientPlace place) {
                 const auto on_stored = [&events = daemon_.writing.events,
                                         caller](const Event& event) {
-                  events.LogUploaded(event, caller);
+                  events.LogLimited(event, caller);
                 };
                 return MakeUpload(*context, *response, {database_.meshes(), on_stored},
                                   daemon_.writing.pool, BoundsOf(std::move(place)));
@@ -89,7 +89,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateModalModel(
         };
         ASSIGN_OR_RETURN(*response->mutable_job(), queue_.Submit(*request, caller.client, check,
                                                                  caller.has(Role::kAdminister)));
-        daemon_.writing.events.LogSubmitted(SubmittedEvent(response->job()), caller);
+        daemon_.writing.events.LogLimited(SubmittedEvent(response->job()), caller);
         return absl::OkStatus();
       });
 }
@@ -107,7 +107,7 @@ grpc::ServerUnaryReactor* ModalModelService::CreateTransfer(
         ASSIGN_OR_RETURN(
             *response->mutable_job(),
             queue_.SubmitTransfer(digest, whole, caller.client, caller.has(Role::kAdminister)));
-        daemon_.writing.events.LogSubmitted(
+        daemon_.writing.events.LogLimited(
             SubmittedEvent(response->job()).With("transfer_of", request->modal_model()), caller);
         return absl::OkStatus();
       });
@@ -133,7 +133,7 @@ grpc::ServerUnaryReactor* ModalModelService::UpdateModalModel(
   return Answer(context, daemon_.writing, Role::kSubmit,
                 [this, request, response](const Principal& caller) {
                   RETURN_IF_ERROR(Update(*request, caller, *response));
-                  daemon_.writing.events.LogUpdated(Updated(*request), caller);
+                  daemon_.writing.events.LogLimited(Updated(*request), caller);
                   return absl::OkStatus();
                 });
 }
@@ -156,7 +156,7 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* ModalModelService::ImportModalModelRa
               [&](const Principal& caller, ClientPlace place) {
                 const auto on_stored = [&events = daemon_.writing.events,
                                         caller](const Event& event) {
-                  events.LogImported(event, caller);
+                  events.LogLimited(event, caller);
                 };
                 // Who may delete a model may also replace it.
                 const Replacing replacing =

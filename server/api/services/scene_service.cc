@@ -232,7 +232,7 @@ absl::StatusOr<uint64_t> SceneService::CreateNew(const grpc::CallbackServerConte
   }
   RETURN_IF_ERROR(scene.status());
   owners_.Add(*scene, caller, *std::move(place), wish);
-  reception_.events.LogScene(
+  reception_.events.LogLimited(
       Event("scene_created", LogLevel::kDebug).With("scene", scenes_.NameOf(*scene)), caller);
   return scene;
 }
@@ -263,7 +263,7 @@ bool SceneService::EndAbandoned(const Principal& caller, const std::optional<std
 }
 
 void SceneService::LogDeleted(const std::string& name, const Principal& caller) const {
-  reception_.events.LogScene(Event("scene_deleted", LogLevel::kDebug).With("scene", name), caller);
+  reception_.events.LogLimited(Event("scene_deleted", LogLevel::kDebug).With("scene", name), caller);
 }
 
 absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
