@@ -120,17 +120,19 @@ class ModelSink {
     v1::TransferRecord record;
     const bool parsed = record.ParseFromString(serialized);
     if (!parsed || (transfers_.empty() && !record.has_header())) {
-      return Refusal(absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
-                     "a record of a transfer cannot be read, or comes before its header: export the "
-                     "model again");
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "TRANSFER_MALFORMED",
+          "a record of a transfer cannot be read, or comes before its header: export the "
+          "model again");
     }
     if (record.has_header()) transfers_.emplace_back();
     transfers_.back() += Delimited(record);
     transfer_byte_count_ += serialized.size();
     if (transfer_byte_count_ <= kMostTransferBytes) return absl::OkStatus();
-    return Refusal(absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
-                   absl::StrCat("a model is imported with at most ", kMostTransferBytes >> 20U,
-                                " MiB of transfers: import it without them, and compute them here"));
+    return Refusal(
+        absl::StatusCode::kResourceExhausted, "MODAL_MODEL_TOO_LARGE",
+        absl::StrCat("a model is imported with at most ", kMostTransferBytes >> 20U,
+                     " MiB of transfers: import it without them, and compute them here"));
   }
 
   static constexpr size_t kMostTransferBytes = size_t{256} << 20U;

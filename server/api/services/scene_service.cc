@@ -263,7 +263,8 @@ bool SceneService::EndAbandoned(const Principal& caller, const std::optional<std
 }
 
 void SceneService::LogDeleted(const std::string& name, const Principal& caller) const {
-  reception_.events.LogLimited(Event("scene_deleted", LogLevel::kDebug).With("scene", name), caller);
+  reception_.events.LogLimited(Event("scene_deleted", LogLevel::kDebug).With("scene", name),
+                               caller);
 }
 
 absl::Status SceneService::CheckObjectCount(uint64_t scene, size_t more) const {
