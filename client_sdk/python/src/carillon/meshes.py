@@ -38,8 +38,11 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         nodes = file.with_suffix(".node").read_bytes()
         return MeshFile(nodes.rstrip(b"\n") + b"\n" + file.with_suffix(".ele").read_bytes(), "node", file.stem)
     data = file.read_bytes()
-    whole = {"gltf": _with_buffers, "inp": _with_includes}.get(mesh_format, lambda _, content: content)
-    return MeshFile(whole(file, data), mesh_format, file.stem)
+    if mesh_format == "gltf":
+        data = _with_buffers(file, data)
+    elif mesh_format == "inp":
+        data = _with_includes(file, data)
+    return MeshFile(data, mesh_format, file.stem)
 
 
 _INPUT = re.compile(rb"""^[ \t]*\*(?:(INCLUDE)|(?:NODE|ELEMENT|NSET|ELSET))[ \t]*(?:,[^,\n]*)*?
