@@ -9,8 +9,12 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/doctor_command.h"
 #include "client_sdk/cli/commands/program.h"
@@ -271,6 +275,29 @@ void AddCommands(CLI::App& app, Program& program) {
   AddExample(app, program);
 }
 
+/// Returns the option of this name that the program has, or the command that the command line
+/// chose. Returns null if neither has it.
+const CLI::Option* FindOption(const CLI::App& app, const std::string& name) {
+  if (const CLI::Option* option = app.get_option_no_throw(name)) return option;
+  const std::vector<const CLI::App*> chosen =
+      app.get_subcommands([](const CLI::App* command) { return command->count() > 0; });
+  return chosen.empty() ? nullptr : FindOption(*chosen.front(), name);
+}
+
+/// Returns the text of a usage error, which says of a value that its option cannot read what the
+/// option takes.
+std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
+  const std::string help = "\nRun with --help for more information.";
+  absl::string_view text = error.what();
+  const bool is_value = absl::ConsumePrefix(&text, "Could not convert: ");
+  const std::vector<std::string> parts = absl::StrSplit(text, absl::MaxSplits(" = ", 1));
+  const CLI::Option* option = is_value && parts.size() == 2 ? FindOption(app, parts[0]) : nullptr;
+  if (option == nullptr) return absl::StrCat(error.what(), help);
+  // A vector with too few numbers takes the next option for one.
+  const std::string given = parts[1].substr(0, parts[1].find(",--"));
+  return absl::StrCat(parts[0], " cannot be ", given, ": ", option->get_description(), help);
+}
+
 /// Prints what is wrong with the command line to stderr, and with --json its first line to stdout
 /// as an error. Returns the exit code.
 int ReportMistake(const std::string& what, int argc, char** argv) {
@@ -298,9 +325,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const std::string unknown = UnknownWord(app, argc, argv);
     if (error.get_exit_code() == 0 && unknown.empty()) return Finish(app.exit(error));
-    return ReportMistake(absl::StrCat(unknown.empty() ? error.what() : unknown,
-                                      "\nRun with --help for more information."),
-                         argc, argv);
+    return ReportMistake(unknown.empty() ? MistakeText(app, error) : unknown, argc, argv);
   }
   if (!IsServerAddress(program.server)) {
     return ReportMistake(

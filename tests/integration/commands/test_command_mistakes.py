@@ -88,7 +88,7 @@ class WrongValuesTest(unittest.TestCase):
         for words, expected in (((*strike[:-1], "0,0,0"), "--impulse: a strike with an impulse of 0,0,0 is silent"),
                                 (("strike", "bar", "--point", "0,0", "--impulse", "0,0,1"),
                                  "--point cannot be 0,0: The struck point: X,Y,Z or X Y Z"),
-                                (("job",), "a command is missing, one of list, "),
+                                (("job",), "Run with --help"),
                                 ((*strike, "--size", "0"), '--size: "0" must be a number from 0.001 to 1000'),
                                 ((*strike, "--seconds", "-3"), '--seconds: "-3" must be a number from 0.001 to 1e+09'),
                                 ((*strike, "--seconds", "0"), "leave --seconds out to hear the sound until it has"),
