@@ -3,6 +3,7 @@
 
 import hashlib
 import json
+import lzma
 import os
 import pathlib
 import resource
@@ -12,6 +13,9 @@ import subprocess
 import tempfile
 import unittest
 
+import numpy
+
+import carillon
 import scripted
 import strike
 from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc
@@ -257,6 +261,50 @@ class DatabaseCommandsTest(unittest.TestCase):
             self.assertEqual(strike.refusal(refused.exception).info.reason, reason)
         shown = (("authorization", "Bearer a token for this test"),)
         self.assertEqual(admin.GetDatabaseStats(request, metadata=shown).model_count, 1)
+
+
+class UpgradeTest(unittest.TestCase):
+    """schema_1.db.xz was written by the programs of the first schema: it has a model of a bar, and a job that had not
+    ended when its daemon was killed."""
+
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.old = self.folder / "old.db"
+        self.old.write_bytes(lzma.decompress(pathlib.Path(__file__).with_name("schema_1.db.xz").read_bytes()))
+        with sqlite3.connect(self.old) as database:
+            self.assertEqual(database.execute("PRAGMA user_version").fetchone(), (1,))
+            (row,), = database.execute("SELECT data FROM model_chunks WHERE array = 0").fetchall()
+        database.close()
+        self.eigenvalues = numpy.frombuffer(row)
+
+    def assert_serves(self):
+        daemon = Daemon(self.folder)
+        self.addCleanup(daemon.stop)
+        with carillon.connect(daemon.server) as c:
+            bar, waited = c.model("bar of schema 1"), next(iter(c.jobs(label_contains="waiting bar"))).wait()
+            bronze = c.materials["bell_bronze"]
+            expected = numpy.sqrt(self.eigenvalues * bronze.young_pa / bronze.density_kg_per_m3) / (2 * numpy.pi)
+            numpy.testing.assert_allclose(bar.frequencies("bell_bronze"), expected, rtol=1e-3)
+            sound = bar.render_strike((0.1, 0.015, 0.008), (0, 0, -0.01), material="bell_bronze")
+            self.assertLess(abs(sound.loudest_frequency_hz() - expected).min(), 2)
+            self.assertEqual(waited.mode_count, 2)
+        self.assertEqual(json.loads(daemon.command("--json", "db", "stats").stdout)["model_count"], 2)
+        self.assertEqual(daemon.stop(), 0)
+        checked = subprocess.run([BIN / "carillond", "--data-dir", self.folder / "data", "db", "check"],
+                                 capture_output=True, text=True, check=True)
+        self.assertIn("0 faults", checked.stdout)
+
+    def test_a_database_of_the_first_schema_sounds_and_its_job_ends(self):
+        (self.folder / "data").mkdir()
+        self.old.rename(self.folder / "data/carillon.db")
+        self.assert_serves()
+
+    def test_a_backup_of_the_first_schema_is_restored(self):
+        subprocess.run([BIN / "carillond", "--data-dir", self.folder / "data", "db", "restore", self.old], check=True,
+                       stdout=subprocess.DEVNULL)
+        self.assert_serves()
 
 
 if __name__ == "__main__":
