@@ -110,6 +110,18 @@ function(carillon_test name)
                        PROPERTIES TIMEOUT ${ROOM_TIMEOUT} LABELS "${ROOM_LABELS}")
 endfunction()
 
+# carillon_tests(server/base digest event pose DEPENDS server_base [...])
+#
+# Tests of a folder that need the same: digest_test.cc, event_test.cc, pose_test.cc.
+function(carillon_tests folder)
+  cmake_parse_arguments(TESTS "" "TIMEOUT" "DEPENDS;LIBRARIES;LABELS" ${ARGN})
+  set(needs ${ARGN})
+  list(REMOVE_ITEM needs ${TESTS_UNPARSED_ARGUMENTS})
+  foreach(test ${TESTS_UNPARSED_ARGUMENTS})
+    carillon_test(${folder}/${test}_test SOURCES ${test}_test.cc ${needs})
+  endforeach()
+endfunction()
+
 # carillon_program_tests(integration test_latency test_rest...)
 #
 # Files of Python in a folder of tests/ that run the real programs, one CTest test a file.
