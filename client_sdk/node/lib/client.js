@@ -19,7 +19,7 @@ const { Scene } = require('./scenes');
 const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
-const { warnOfContacts, warnOfLabel, warnOfTransfers, warnOfUnit } = require('./warnings');
+const { warnOfContacts, warnOfLabel, warnOfTransfers } = require('./warnings');
 
 const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
@@ -164,7 +164,6 @@ class Client {
     const deadline = timeout === undefined ? {} : { deadline: Date.now() + 1000 * timeout };
     try {
       for await (const answer of this.answers(this.stub('DecompositionService').WatchJob({ name: job.name }, deadline))) {
-        warnOfUnit(answer.job, newest);
         newest = answer.job;
         onProgress(newest);
       }

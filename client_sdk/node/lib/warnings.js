@@ -19,17 +19,6 @@ function warnOfLabel(label, wanted) {
   'LabelWarning');
 }
 
-// The contract (Progress.extentM) says above which extent the unit is likely to be wrong.
-const LIKELY_EXTENT_M = 20;
-
-/** Warns if the state of a job, newer than `before`, is the first to say that the body is suspiciously large. */
-function warnOfUnit(job, before) {
-  const extent = job.progress?.extentM ?? 0;
-  if (extent <= LIKELY_EXTENT_M || (before.progress?.extentM ?? 0) > LIKELY_EXTENT_M) return;
-  process.emitWarning(`the body is ${Number(extent.toPrecision(3))} m across; if its coordinates are in another unit than metres, ` +
-    "cancel and give the unit, such as unit: 'mm'", 'UnitWarning');
-}
-
 /** Passes on what the daemon says about contacts that are probably a mistake of the caller. */
 function warnOfContacts(warnings) {
   for (const { id, text } of warnings) process.emitWarning(`${id}: ${text}`, { type: 'ContactWarning', code: id });
@@ -41,4 +30,4 @@ function warnOfOpenStream(scene) {
     'last contacts may not have sounded; await its close()' }]);
 }
 
-module.exports = { warnOfContacts, warnOfLabel, warnOfOpenStream, warnOfTransfers, warnOfUnit };
+module.exports = { warnOfContacts, warnOfLabel, warnOfOpenStream, warnOfTransfers };

@@ -14,7 +14,7 @@ const { fromCall, fromInfo } = require('carillon/lib/errors');
 const { toMeshFile } = require('carillon/lib/meshes');
 const { stateOf } = require('carillon/lib/progress');
 const { toSettings } = require('carillon/lib/settings');
-const { warnOfContacts, warnOfLabel, warnOfUnit } = require('carillon/lib/warnings');
+const { warnOfContacts, warnOfLabel } = require('carillon/lib/warnings');
 
 const POINT = [0, 0, 0];
 const IMPULSE = [0, 0, 1];
@@ -75,16 +75,6 @@ test('an object of another scene is refused', async () => {
     assert.throws(() => stream.step(0, { impacts }), /object of scenes\/1, and this is a stream of scenes\/2/);
   }
   await assert.rejects(stream.close(), carillon.ServerUnavailable);
-});
-
-test('a body of a likely wrong unit is told once', async () => {
-  const told = [];
-  for (const [before, extentM] of [[0, 20], [20, 202], [202, 202]]) {
-    const state = (extent) => ({ progress: { extentM: extent } });
-    told.push(await warningsOf(() => warnOfUnit(state(extentM), state(before))));
-  }
-  assert.deepEqual([told[0], told[2]], [[], []]);
-  assert.match(told[1].join(), /^UnitWarning: the body is 202 m across; .*unit: 'mm'$/);
 });
 
 test('what is no mesh is refused', async () => {

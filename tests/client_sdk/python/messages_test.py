@@ -10,26 +10,16 @@ import pickle
 import tempfile
 import types
 import unittest
-import warnings
 from unittest import mock
 
 import grpc
 import numpy
 
 import carillon
-from carillon.v1 import (
-    audio_service_pb2, contact_service_pb2, decomposition_pb2, error_pb2,
-    scene_service_pb2, warning_pb2)
+from carillon.v1 import audio_service_pb2, contact_service_pb2, error_pb2, scene_service_pb2, warning_pb2
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
 MESH = ([(0, 0, 0)], [(0, 0, 0)])
-
-
-def warnings_of(function, *arguments):
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        function(*arguments)
-    return [str(item.message) for item in caught]
 
 
 def made(**content):
@@ -57,15 +47,6 @@ class WarningsTest(unittest.TestCase):
         for told in caught.warning, pickle.loads(pickle.dumps(caught.warning)):
             self.assertEqual((told.id, told.count, told.figures, str(told)),
                              ("POINTS_DISTANT", 1, {"largest_distance_m": 2}, "POINTS_DISTANT: a sentence"))
-
-    def test_a_body_of_a_likely_wrong_unit_is_told_once(self):
-        texts, before = [], decomposition_pb2.Job()
-        for extent_m in (0, 20, 202, 202):
-            job = decomposition_pb2.Job(progress={"extent_m": extent_m})
-            texts.append(warnings_of(carillon.job_calls.warn_of_extent, before, job))
-            before = job
-        self.assertEqual([len(text) for text in texts], [0, 0, 1, 0])
-        self.assertRegex(texts[2][0], '^the body is 202 m across; .*unit="mm"$')
 
 
 class RefusalsTest(MessagesTest):

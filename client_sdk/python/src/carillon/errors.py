@@ -59,10 +59,6 @@ class TransferWarning(UserWarning):
     """An object sounded before it was computed how it radiates, so that the same request will sound different."""
 
 
-class UnitWarning(UserWarning):
-    """A body is so large that its unit is likely to be wrong."""
-
-
 class LabelWarning(UserWarning):
     """A model was there already, and has another label than the one that was asked for."""
 
@@ -79,12 +75,6 @@ def warn_of_open_stream(scene: str) -> None:
     _warn(ContactWarning(warning_pb2.Warning(
         id="STREAM_NOT_CLOSED", text=f"a stream of {scene} was not closed, so that its last contacts may not have "
         "sounded; close it, or use it as a context manager")))
-
-
-def warn_of_unit(extent_m: float) -> None:
-    """Warns of a body whose box has the diagonal `extent_m`, metres."""
-    _warn(f"the body is {extent_m:.3g} m across; if its coordinates are in another unit than metres, cancel and give "
-          'the unit, such as unit="mm"', UnitWarning)
 
 
 def warn_of_transfers(labels: Sequence[str]) -> None:

@@ -10,9 +10,6 @@ from carillon import checks, errors, progress
 from carillon.connection import Connection
 from carillon.v1 import decomposition_pb2, decomposition_service_pb2
 
-# The contract (Progress.extent_m) says above which extent the unit is likely to be wrong.
-LIKELY_EXTENT_M = 20
-
 
 def to_states(states: Iterable[str]) -> list[Any]:
     """The values of the contract for states such as "failed"."""
@@ -48,7 +45,6 @@ async def follow(connection: Connection, job: decomposition_pb2.Job, timeout: Op
     request = decomposition_service_pb2.WatchJobRequest(name=job.name)
     try:
         async for answer in connection.answers(connection.jobs_stub.WatchJob, request, timeout):
-            warn_of_extent(job, answer.job)
             job = answer.job
             note(job)
     except errors.CarillonError as error:
@@ -62,9 +58,3 @@ async def follow(connection: Connection, job: decomposition_pb2.Job, timeout: Op
     if job.state != decomposition_pb2.JOB_STATE_SUCCEEDED:
         raise errors.from_info(job.error)
     return job
-
-
-def warn_of_extent(before: decomposition_pb2.Job, job: decomposition_pb2.Job) -> None:
-    """Warns once of a body so large that its unit is likely to be wrong."""
-    if job.progress.extent_m > LIKELY_EXTENT_M >= before.progress.extent_m:
-        errors.warn_of_unit(job.progress.extent_m)
