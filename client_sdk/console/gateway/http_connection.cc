@@ -5,8 +5,12 @@
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "client_sdk/console/gateway/web_pages.h"
@@ -21,7 +25,9 @@ using Response = HttpConnection::Response;
 
 constexpr std::chrono::seconds kPatience{10};
 constexpr uint32_t kMostHeaderBytes = 8192;
-constexpr std::string_view kTokenQuery = "/?token=";
+constexpr std::string_view kScriptType = "text/javascript; charset=utf-8";
+constexpr std::string_view kTokenQuery = "?token=";
+constexpr std::string_view kOwnPages = "/pages/";
 
 std::string_view Field(const Request& request, http::field field) {
   const auto value = request[field];
@@ -62,9 +68,52 @@ Response PageOf(const Request& request, const WebPage& page) {
   return response;
 }
 
+std::string TypeOf(const std::filesystem::path& file) {
+  constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
+      {".html", "text/html; charset=utf-8"},
+      {".js", kScriptType},
+      {".mjs", kScriptType},
+      {".css", "text/css; charset=utf-8"},
+      {".json", "application/json"},
+      {".wasm", "application/wasm"},
+      {".png", "image/png"},
+      {".svg", "image/svg+xml"},
+  };
+  for (const auto& [suffix, type] : kTypes) {
+    if (file.extension() == suffix) return std::string(type);
+  }
+  return "application/octet-stream";
+}
+
+/// Returns a file of the user's own pages; nothing if there is none of that name. Such a page may
+/// do what its author wants, but is as isolated from other pages as the console's own.
+std::optional<Response> OwnPageOf(const Request& request, const std::string& folder,
+                                  std::string_view name) {
+  std::error_code error;
+  const std::filesystem::path root = std::filesystem::canonical(folder, error);
+  if (folder.empty() || error) return std::nullopt;
+  const std::filesystem::path file =
+      std::filesystem::canonical(root / (name.empty() ? "index.html" : std::string(name)), error);
+  // A link or ".." must not lead out of the folder.
+  if (error || !std::filesystem::is_regular_file(file, error) ||
+      !file.string().starts_with(root.string() + "/")) {
+    return std::nullopt;
+  }
+  std::ifstream stream(file, std::ios::binary);
+  Response response = Plain(request, http::status::ok, "");
+  response.set(
+      "Content-Security-Policy",
+      "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; "
+      "style-src 'self' 'unsafe-inline'; frame-ancestors 'none'");
+  response.set(http::field::content_type, TypeOf(file));
+  response.body() = std::string(std::istreambuf_iterator<char>(stream), {});
+  response.prepare_payload();
+  return response;
+}
+
 }  // namespace
 
-Response HttpConnection::Answer(const Request& request, const Admission& admission) {
+Response HttpConnection::Answer(const Request& request, const Console& console) {
   if (!Admission::IsOwnHost(Field(request, http::field::host))) {
     return Plain(request, http::status::misdirected_request,
                  "the console answers to localhost and 127.0.0.1 only");
@@ -72,19 +121,24 @@ Response HttpConnection::Answer(const Request& request, const Admission& admissi
   if (request.method() != http::verb::get) {
     return Plain(request, http::status::method_not_allowed, "only GET is served");
   }
-  std::string_view target = Target(request);
-  if (target.starts_with(kTokenQuery) && admission.IsToken(target.substr(kTokenQuery.size()))) {
+  const std::string_view target = Target(request);
+  const std::string_view path = target.substr(0, target.find('?'));
+  const std::string_view query = target.substr(path.size());
+  if ((path == "/" || path.starts_with(kOwnPages)) && query.starts_with(kTokenQuery) &&
+      console.admission.IsToken(query.substr(kTokenQuery.size()))) {
     Response response = Plain(request, http::status::see_other, "");
-    response.set(http::field::location, "/");
-    response.set(http::field::set_cookie, admission.SetCookie());
+    response.set(http::field::location, std::string(path));
+    response.set(http::field::set_cookie, console.admission.SetCookie());
     return response;
   }
-  if (!admission.HasCookie(Field(request, http::field::cookie))) {
+  if (!console.admission.HasCookie(Field(request, http::field::cookie))) {
     return Plain(request, http::status::unauthorized,
                  "open the address that carillon-console prints, with its token");
   }
-  target = target.substr(0, target.find('?'));
-  const WebPage* page = FindWebPage(target);
+  if (path.starts_with(kOwnPages)) {
+    if (auto file = OwnPageOf(request, console.pages, path.substr(kOwnPages.size()))) return *file;
+  }
+  const WebPage* page = FindWebPage(path);
   if (page == nullptr) return Plain(request, http::status::not_found, "there is no such page");
   return PageOf(request, *page);
 }
@@ -117,7 +171,7 @@ void HttpConnection::Run() {
 
 void HttpConnection::Take(const Request& request) {
   if (!boost::beast::websocket::is_upgrade(request) || Target(request) != "/tunnel") {
-    return Send(Answer(request, console_->admission));
+    return Send(Answer(request, *console_));
   }
   if (auto refusal = TunnelRefusal(request, *console_)) return Send(*std::move(refusal));
   // The deleter holds the count of tunnels up until the tunnel ends.

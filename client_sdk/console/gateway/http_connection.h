@@ -9,6 +9,7 @@
 #include <boost/beast/http/string_body.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "client_sdk/console/gateway/admission.h"
 #include "client_sdk/console/gateway/tunnel.h"
@@ -19,6 +20,8 @@ namespace carillon::console {
 struct Console {
   Admission admission;
   std::shared_ptr<const Upstream> upstream;
+  /// A folder of the user's own pages, which are served below "/pages/"; empty without one.
+  std::string pages;
   /// Lasts as long as a tunnel does; its use count, less one, is the number of tunnels.
   std::shared_ptr<int> tunnel_count = std::make_shared<int>();
 
@@ -41,7 +44,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void Run();
 
   /// Returns the answer to a request that is none for a tunnel.
-  static Response Answer(const Request& request, const Admission& admission);
+  static Response Answer(const Request& request, const Console& console);
 
   /// Returns why a request for a tunnel is refused; nothing if it is not.
   static std::optional<Response> TunnelRefusal(const Request& request, const Console& console);

@@ -32,7 +32,7 @@ void Accept(tcp::acceptor& acceptor, const std::shared_ptr<Console>& console) {
   });
 }
 
-int Serve(const std::string& server, uint16_t port) {
+int Serve(const std::string& server, uint16_t port, const std::string& pages) {
   asio::io_context context(1);
   tcp::acceptor acceptor(context);
   const tcp::endpoint wanted(asio::ip::address_v4::loopback(), port);
@@ -51,8 +51,8 @@ int Serve(const std::string& server, uint16_t port) {
   const auto upstream = std::make_shared<Upstream>();
   upstream->server = server;
   upstream->token = token == nullptr ? "" : token;
-  const auto console = std::make_shared<Console>(
-      Console{.admission = carillon::console::Admission(port), .upstream = upstream});
+  const auto console = std::make_shared<Console>(Console{
+      .admission = carillon::console::Admission(port), .upstream = upstream, .pages = pages});
   Accept(acceptor, console);
   asio::signal_set signals(context, SIGINT, SIGTERM);
   signals.async_wait([&](boost::system::error_code, int) { context.stop(); });
@@ -73,7 +73,10 @@ int main(int argc, char** argv) {
   app.add_option("--server", server, "The address of the daemon")->capture_default_str();
   app.add_option("--port", port, "The port of 127.0.0.1 to listen at; 0 takes any")
       ->capture_default_str();
+  std::string pages;
+  app.add_option("--pages", pages, "A folder of your own pages, which are served below /pages/")
+      ->check(CLI::ExistingDirectory);
   app.set_version_flag("--version", CARILLON_VERSION);
   CLI11_PARSE(app, argc, argv);
-  return Serve(server, port);
+  return Serve(server, port, pages);
 }

@@ -24,7 +24,7 @@ constexpr const char* kServed[] = {
     "/grpc.health.v1.Health/",
 };
 
-/// How long the reading of a socket rests while the daemon is behind.
+/// How long the reading of a socket rests while one of the two sides is behind.
 constexpr std::chrono::milliseconds kRest{5};
 
 }  // namespace
@@ -55,7 +55,7 @@ void Tunnel::Run(const Request& request) {
 }
 
 void Tunnel::Read() {
-  if (IsDaemonBehind()) {
+  if (IsBehind()) {
     timer_.expires_after(kRest);
     timer_.async_wait([self = shared_from_this()](error_code) { self->Read(); });
     return;
@@ -160,10 +160,10 @@ void Tunnel::CancelCalls() {
   for (const auto& [number, call] : calls_) call->Cancel();
 }
 
-bool Tunnel::IsDaemonBehind() const {
+bool Tunnel::IsBehind() const {
   size_t bytes = 0;
   for (const auto& [number, call] : calls_) bytes += call->WaitingBytes();
-  return bytes > kMostFrameBytes;
+  return bytes > kMostFrameBytes || waiting_bytes_ > 2 * kMostFrameBytes;
 }
 
 }  // namespace carillon::console

@@ -68,8 +68,9 @@ class Tunnel : public std::enable_shared_from_this<Tunnel> {
   void OnMessage(uint32_t number, std::string bytes);
   void OnEnd(uint32_t number, const grpc::Status& status);
   void CancelCalls();
-  /// Whether more bytes wait for the daemon than a call may have in one message.
-  bool IsDaemonBehind() const;
+  /// Whether more bytes wait for the daemon, or answers for a browser that goes on asking, than a
+  /// message or two may have.
+  bool IsBehind() const;
 
   boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
   boost::asio::steady_timer timer_;

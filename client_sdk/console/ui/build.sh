@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # build.sh NODE_MODULES PROTO FOLDER: generates the contract's TypeScript, checks the types, and leaves the compressed
-# pages in FOLDER.
+# pages in FOLDER, and the package @carillon/web as FOLDER/carillon-web.tgz.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 modules=$(cd "$1" && pwd)
@@ -12,7 +12,7 @@ folder=$(cd "$3" && pwd)
 
 rm -rf "$folder/ui"
 mkdir -p "$folder/ui"
-cp -r "$here/src" "$here/index.html" "$here/style.css" "$here/tsconfig.json" "$folder/ui"
+cp -r "$here"/{src,web,index.html,style.css,tsconfig.json,tsconfig.web.json} "$folder/ui"
 ln -s "$modules" "$folder/ui/node_modules"
 cd "$folder/ui"
 rm -rf src/gen
@@ -24,19 +24,26 @@ protoc -I "$proto" --plugin=protoc-gen-es=./protoc-gen-es --es_out=src/gen --es_
   "$proto"/carillon/v1/*.proto
 node node_modules/typescript/bin/tsc
 bundler=$(echo node_modules/@esbuild/linux-*/bin/esbuild)
+# bundle FOLDER FILE...
 bundle() {
-  "$bundler" "$@" --bundle --minify --format=esm --target=es2022 --outdir="$folder" \
+  "$bundler" "${@:2}" --bundle --minify --format=esm --target=es2022 --outdir="$1" \
     --legal-comments=none --log-level=warning --jsx=automatic --jsx-import-source=preact
 }
 # What the page and its worker have in common is one file.
-bundle src/main.tsx src/listen_worker.ts --splitting --chunk-names=shared
-bundle src/player_worklet.ts
+bundle "$folder" src/main.tsx src/listen_worker.ts --splitting --chunk-names=shared
+bundle "$folder" src/player_worklet.ts
+bundle web src/web.ts src/listen_worker.ts --splitting --chunk-names=shared
+bundle web src/player_worklet.ts
+node node_modules/typescript/bin/tsc --project tsconfig.web.json
 for package in three three-mesh-bvh preact @preact/signals{,-core} @bufbuild/protobuf @connectrpc/connect; do
   printf '%s\n\n' "$package"
   cat "node_modules/$package"/LICENSE* 2>/dev/null ||
     sed -n 's/^ *"license": *//p' "node_modules/$package/package.json"
   printf '\n\n'
 done >"$folder/licences.txt"
+cp "$folder/licences.txt" web
+tar --create --gzip --file "$folder/carillon-web.tgz" --transform 's,^web,package,' --sort=name --owner=0 --group=0 \
+  --numeric-owner --mtime=@0 web
 for page in index.html style.css; do cp "$page" "$folder"; done
 cd "$folder"
 for page in {index.html,style.css,{main,listen_worker,shared,player_worklet}.js,licences.txt}; do

@@ -13,9 +13,9 @@ const address = new URL(process.env.CARILLON_CONSOLE);
 const origin = `http://${address.host}`;
 const pictures = process.env.CARILLON_TEST_PICTURES;
 
-function get(target, headers = {}) {
+function get(target, headers = {}, port = address.port) {
   return new Promise((resolve, reject) => {
-    http.get({ host: address.hostname, port: address.port, path: target, headers }, (response) => {
+    http.get({ host: address.hostname, port, path: target, headers }, (response) => {
       response.resume();
       response.on('end', () => resolve(response));
     }).on('error', reject);
@@ -147,6 +147,16 @@ test('a tunnel serves no administration, and ends at a frame that is none', asyn
   assert.equal(await closed, 1002);
 });
 
+/** The brightness of pixels of a screenshot, 0 to 255, of which each is the mean of red, green and blue. */
+function brightnessAt(page, screenshot, places) {
+  return page.evaluate(async ([base64, wanted]) => {
+    const image = await createImageBitmap(new Blob([Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))]));
+    const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    pen.drawImage(image, 0, 0);
+    return wanted.map(([x, y]) => pen.getImageData(x, y, 1, 1).data.slice(0, 3).reduce((sum, part) => sum + part / 3, 0));
+  }, [screenshot.toString('base64'), places]);
+}
+
 /** The variance of the brightness of a part of a screenshot, which is 0 if nothing is drawn there. */
 async function variance(page, selector, file) {
   const picture = await page.locator(selector).screenshot({ path: path.join(pictures, file) });
@@ -163,8 +173,8 @@ async function variance(page, selector, file) {
   }, picture.toString('base64'));
 }
 
-/** Runs `work` with the console in Chromium, which must report no error. */
-async function inBrowser(work) {
+/** Runs `work` with the console, or a page of one's own, in Chromium, which must report no error. */
+async function inBrowser(work, target = address.href) {
   const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: process.getuid() === 0 ? ['--no-sandbox'] : [] });
   try {
     const page = await browser.newPage({ viewport: { width: 1200, height: 800 } });
@@ -172,8 +182,11 @@ async function inBrowser(work) {
     const faults = [];
     page.on('pageerror', (error) => faults.push(error.message));
     page.on('console', (message) => { if (message.type() === 'error') faults.push(message.text()); });
-    await page.goto(address.href);
-    await work(page);
+    await page.goto(target);
+    await work(page).catch(async (error) => {
+      error.message += `; the page says: ${await page.locator('.news, .fault').allTextContents()} ${faults}`;
+      throw error;
+    });
     assert.deepEqual(faults, []);
   } finally {
     await browser.close();
@@ -256,6 +269,24 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   await page.waitForFunction(() => carillonConsole.state.model.value.shapes.get(0));
   await keepPicture(page, 'console_strike.png');
 
+  // Another material of another Poisson's ratio sounds at once, as its speed of sound says, and the page says what is not exact.
+  const lowestHz = () => page.evaluate(async () => {
+    const { state } = carillonConsole;
+    const { objects } = await state.services.scenes.listObjects({ scene: state.sceneName() });
+    return [state.modes.value[0].frequencyHz, objects[0].lowestFrequencyHz];
+  });
+  await page.getByLabel(/^Material/).selectOption('soda_lime_glass');
+  await page.getByText('another Poisson’s ratio').waitFor();
+  const speed = await page.evaluate(() => {
+    const of = (name) => carillonConsole.state.materials.value.find((entry) => entry.name === name).material;
+    const [glass, steel] = [of('soda_lime_glass'), of('structural_steel')];
+    return Math.sqrt(glass.youngPa / glass.densityKgPerM3 / (steel.youngPa / steel.densityKgPerM3));
+  });
+  await page.waitForFunction(() => !carillonConsole.state.busy.value);
+  for (const hz of await lowestHz()) assert.ok(Math.abs(hz / modes[0] / speed - 1) < 1e-3, `${hz} Hz`);
+  assert.equal(await page.locator('.fault').count(), 0);
+  await page.getByLabel(/^Material/).selectOption('structural_steel');
+
   // Half the size is twice the frequency; the page and the daemon agree.
   const half = page.getByLabel(/^Size/);
   await half.fill('-0.3');
@@ -274,11 +305,43 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   await page.keyboard.press('Space');
   await page.waitForFunction((was) => carillonConsole.state.strike.value.point[0] !== was[0], before);
 
+  // What the test keeps for its comparison, and the motion, have no processor left for a rendering.
+  await page.evaluate(() => {
+    carillonConsole.view().paused = true;
+    carillonConsole.player.node.port.postMessage({ tap: false });
+  });
   const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Save WAV').click()]);
   const wave = fs.readFileSync(await download.path());
   assert.equal(wave.toString('latin1', 0, 4), 'RIFF');
   assert.ok(new Float32Array(new Uint8Array(wave.subarray(44)).buffer).some((sample) => Math.abs(sample) > 1e-5));
   assert.deepEqual(await accessibilityFaults(page), []);
+}));
+
+test('with less motion a mode stands still, and its nodal lines are seen without colours, too', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.emulateMedia({ reducedMotion: 'reduce' });
+  await page.reload();
+  await page.waitForFunction(() => carillonConsole.state.model.value && !carillonConsole.state.busy.value);
+  const devtools = await page.context().newCDPSession(page);
+  await devtools.send('Emulation.setEmulatedVisionDeficiency', { type: 'achromatopsia' });
+  await page.getByRole('listbox').press('ArrowDown');
+  await page.waitForFunction(() => carillonConsole.state.model.value.shapes.get(0));
+  await page.waitForTimeout(1500);
+  const still = await page.locator('.body').screenshot({ path: path.join(pictures, 'grey.png') });
+  await page.waitForTimeout(1500);
+  assert.ok(still.equals(await page.locator('.body').screenshot()), 'the body moves');
+  // A free bar's first bending mode is at rest at 0.224 of the length from each end, and moves there least.
+  const shares = [0.03, 0.224, 0.5, 0.776, 0.97];
+  const places = await page.evaluate((along) => {
+    const { camera, canvas } = carillonConsole.view();
+    const { vertices } = carillonConsole.state.model.value;
+    const [low, high] = [Math.min, Math.max].map((of) => [0, 1, 2].map((axis) => of(...vertices.filter((_, i) => i % 3 === axis))));
+    return along.map((share) => {
+      const { x, y } = camera.position.clone().set(low[0] + share * (high[0] - low[0]), (low[1] + high[1]) / 2, high[2]).project(camera);
+      return [Math.round((x + 1) / 2 * canvas.clientWidth), Math.round((1 - y) / 2 * canvas.clientHeight)];
+    });
+  }, shares);
+  const [end, node, middle, otherNode, otherEnd] = await brightnessAt(page, still, places);
+  assert.ok(Math.max(node, otherNode) < 0.7 * Math.min(end, middle, otherEnd), `${[end, node, middle, otherNode, otherEnd]}`);
 }));
 
 test('a refused mesh is shown with the place that is wrong, and repaired by a button', { timeout: 400000 }, () => inBrowser(async (page) => {
@@ -323,6 +386,47 @@ test('the models are listed with their pictures, and the space bar lets one be h
   await keepPicture(page, 'console_models.png');
   assert.deepEqual(await accessibilityFaults(page), []);
 }));
+
+test('thirty bodies of a page of one’s own fall in Rapier, and are heard', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.waitForFunction(() => globalThis.example);
+  await page.mouse.click(300, 300);
+  await page.waitForFunction(() => example.carillon.player.analyser);
+  await page.evaluate(() => {
+    const { player } = example.carillon;
+    globalThis.loudest = 0;
+    player.onSamples = (samples) => { loudest = Math.max(loudest, ...samples.map(Math.abs)); };
+    player.node.port.postMessage({ tap: true });
+  });
+  // They fall from up to five metres, and lie at last.
+  await page.waitForFunction(() => example.bodies.every((body) => Math.abs(body.translation().y) < 0.3) && loudest > 1e-4);
+  await page.waitForFunction(() => example.scene.report?.acceptedCount > 30n);
+  const { rejected, dropped, poses } = await page.evaluate(async () => {
+    const { objects } = await example.carillon.services.scenes.listObjects({ scene: example.scene.name });
+    return { rejected: Number(example.scene.report.rejectedCount), dropped: Number(example.scene.report.droppedCount),
+      poses: objects.map(({ pose }) => pose.positionM.y) };
+  });
+  assert.deepEqual([rejected, dropped, poses.length], [0, 0, 30]);
+  assert.ok(Math.max(...poses) < 5, `${poses}`);
+  assert.ok(await variance(page, 'canvas', 'example.png') > 20);
+  await keepPicture(page, 'console_example.png');
+}, process.env.CARILLON_EXAMPLE));
+
+test('a page of one’s own needs the cookie, and none outside of its folder is served', async () => {
+  const example = new URL(process.env.CARILLON_EXAMPLE);
+  const ask = (target, headers) => get(target, headers, example.port);
+  assert.equal((await ask('/pages/')).statusCode, 401);
+  const shown = await ask(example.pathname + example.search);
+  assert.deepEqual([shown.statusCode, shown.headers.location], [303, '/pages/']);
+  assert.equal((await ask(`//evil.example/${example.search}`)).statusCode, 401);
+  const headers = { cookie: shown.headers['set-cookie'][0].split(';')[0] };
+  const page = await ask('/pages/', headers);
+  assert.equal(page.statusCode, 200);
+  assert.equal(page.headers['cross-origin-embedder-policy'], 'require-corp');
+  for (const target of ['/pages/../bar.obj', '/pages/../../../../etc/passwd', '/pages//etc/passwd', '/pages/.']) {
+    assert.equal((await ask(target, headers)).statusCode, 404, target);
+  }
+  assert.equal((await get('/pages/', { cookie: await cookie() })).statusCode, 404);
+});
 
 test('after the daemon was killed and started again, the page strikes as before', { timeout: 400000 }, () => inBrowser(async (page) => {
   await page.waitForFunction(() => carillonConsole.state.model.value && !carillonConsole.state.busy.value);

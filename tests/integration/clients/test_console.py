@@ -5,17 +5,20 @@ import math
 import os
 import pathlib
 import signal
+import shutil
 import subprocess
+import tarfile
 import threading
 import time
 import unittest
 
 import carillon
 import meshes
-from daemon import BIN, DaemonTest
+from daemon import BIN, ROOT, DaemonTest
 
 # Of the bar in structural steel, whose speed of sound is sqrt(E/rho).
 BAR_HZ = meshes.bar_first_bending_hz() * math.sqrt(2.1e11 / 7850 * meshes.DENSITY / meshes.YOUNG_PA)
+BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -37,6 +40,23 @@ class ConsoleTest(DaemonTest):
 
         self.addCleanup(stop)
         return program, program.stdout.readline().strip()
+
+    def bundle_example(self):
+        """Bundles the example for browsers with the package @carillon/web, as its pages say; returns their folder."""
+        modules, pages = self.folder / "node_modules", self.folder / "pages"
+        with tarfile.open(BUILD / "client_sdk/console/pages/carillon-web.tgz") as package:
+            package.extractall(modules / "@carillon")
+        web = (modules / "@carillon/package").rename(modules / "@carillon/web")
+        console, engines = os.environ["CARILLON_CONSOLE_MODULES"], os.environ["CARILLON_ENGINE_MODULES"]
+        esbuild, = pathlib.Path(console).glob("@esbuild/linux-*/bin/esbuild")
+        example = ROOT / "client_sdk/examples/browser"
+        subprocess.run([esbuild, example / "main.js", "--bundle", "--format=esm", f"--outfile={pages}/main.js",
+                        "--log-level=warning"], check=True,
+                       env={**os.environ, "NODE_PATH": f"{modules}:{engines}:{console}"})
+        shutil.copy(example / "index.html", pages)
+        for name in ("listen_worker.js", "shared.js", "player_worklet.js"):
+            shutil.copy(web / name, pages)
+        return pages
 
     def simulate(self):
         """Strikes three bars in a muted scene, in turn, until the test is done; goes on after the daemon's end."""
@@ -69,7 +89,10 @@ class ConsoleTest(DaemonTest):
         threads = [threading.Thread(target=work) for work in (self.simulate, self.restart)]
         for thread in threads:
             thread.start()
+        example = self.start("carillon-console", "--server", self.daemon.server, "--port", "0", "--pages",
+                             self.bundle_example())[1]
         environment = {**os.environ, "NODE_PATH": os.environ["CARILLON_CONSOLE_MODULES"], "CARILLON_CONSOLE": address,
+                       "CARILLON_EXAMPLE": example.replace("/?", "/pages/?"),
                        "CARILLON_CONSOLE_PID": str(console.pid), "CARILLON_DAEMON_PID": str(self.daemon.process.pid),
                        "CARILLON_TEST_BAR": str(self.bar), "CARILLON_TEST_OPEN": str(opened),
                        "CARILLON_TEST_BAR_HZ": str(BAR_HZ), "CARILLON_TEST_PICTURES": str(self.folder)}

@@ -8,6 +8,9 @@ import type { ModalModel, SoundingMode } from './modal_model';
 
 /** The largest displacement, as a share of the body's extent. */
 const BEND = 0.05;
+/** From what does not move to what moves most (viridis): lightness alone tells them apart, too. */
+const RAMP = [0x440154, 0x3b528b, 0x21918c, 0x5ec962, 0xfde725].map((color) => new THREE.Color(color));
+const REST_COLOR = new THREE.Color(0x9aa4ad);
 const MODES_OF_A_STRIKE = 24;
 const MODE_HZ = 1, SLOW_STRIKE_S = 6;
 
@@ -26,7 +29,7 @@ export class BodyView {
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(40, 1, 1e-4, 1e4);
   private readonly controls: OrbitControls;
-  private readonly dot = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd43d00 }));
+  private readonly dot = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd43d00, depthTest: false }));
   private model?: ModalModel;
   private readonly marks = new THREE.Group();
   private body?: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
@@ -54,6 +57,7 @@ export class BodyView {
     this.camera.add(sun);
     this.scene.add(this.camera);
     this.dot.visible = false;
+    this.dot.renderOrder = 1;  // above the body, which may swing over it
     this.pickByClick();
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.renderer.setAnimationLoop((now) => this.draw(now));
@@ -69,6 +73,7 @@ export class BodyView {
       const mark = new THREE.Mesh(this.dot.geometry, this.dot.material);
       mark.position.set(...place);
       mark.scale.setScalar(this.extent * 0.02);
+      mark.renderOrder = 1;
       this.marks.add(mark);
     }
     if (places.length === 2) {
@@ -191,6 +196,8 @@ export class BodyView {
     this.slowness = slowness;
     this.begin = performance.now();
     this.largest = Math.max(this.measure(0.25), 1e-30);
+    // A mode keeps its colours while it swings, so that its nodal lines stay in sight.
+    if (weights.length === 1) this.paint(this.displaced(0.25));
   }
 
   private measure(time: number): number {
@@ -216,25 +223,21 @@ export class BodyView {
     return moved;
   }
 
-  private paint(moved?: Float32Array): void {
+  private paint(moved?: Float32Array, withColors = true): void {
     const { position, color } = this.body!.geometry.attributes as Record<string, THREE.BufferAttribute>;
     const places = position!.array as Float32Array, colors = color!.array as Float32Array;
     const { vertices } = this.model!;
     const factor = moved ? BEND * this.extent / this.largest : 0;
-    for (let vertex = 0; vertex < vertices.length / 3; vertex += 1) {
-      let size = 0;
-      for (let axis = 0; axis < 3; axis += 1) {
-        const step = moved ? factor * moved[3 * vertex + axis]! : 0;
-        places[3 * vertex + axis] = vertices[3 * vertex + axis]! + step;
-        size += step * step;
-      }
-      // Dark blue where nothing moves, which shows the nodal lines, to yellow; light alone tells them apart, too.
-      const share = moved ? Math.min(1, Math.sqrt(size) / (BEND * this.extent)) : 0.5;
-      colors[3 * vertex] = 0.1 + 0.88 * share;
-      colors[3 * vertex + 1] = 0.18 + 0.65 * share;
-      colors[3 * vertex + 2] = 0.45 - 0.3 * share;
+    for (let i = 0; i < places.length; i += 1) places[i] = vertices[i]! + (moved ? factor * moved[i]! : 0);
+    position!.needsUpdate = true;
+    if (!withColors) return;
+    const shade = new THREE.Color();
+    for (let i = 0; i < places.length; i += 3) {
+      const share = moved ? Math.min(1, Math.hypot(moved[i]!, moved[i + 1]!, moved[i + 2]!) / this.largest) : 0;
+      const place = share * (RAMP.length - 1), stop = Math.min(RAMP.length - 2, Math.floor(place));
+      (moved ? shade.lerpColors(RAMP[stop]!, RAMP[stop + 1]!, place - stop) : REST_COLOR).toArray(colors, i);
     }
-    position!.needsUpdate = color!.needsUpdate = true;
+    color!.needsUpdate = true;
   }
 
   private lookAt(geometry: THREE.BufferGeometry): void {
@@ -265,7 +268,7 @@ export class BodyView {
     this.dirty = false;
     if (this.model && this.weights.length) {
       const time = this.still ? 0.25 : (now - this.begin) / 1000;
-      this.paint(this.displaced(this.slowness === 1 ? time : time % SLOW_STRIKE_S));
+      this.paint(this.displaced(this.slowness === 1 ? time : time % SLOW_STRIKE_S), this.weights.length > 1);
     }
     if (this.weights.length) this.controls.update();
     this.budget.draw(this.scene, this.camera);

@@ -7,6 +7,8 @@ export class Player {
   analyser?: AnalyserNode;
   node?: AudioWorkletNode;
   underruns = 0;
+  /** The frames that wait to be played, on average; what jitters more than they last is a gap. */
+  target = 0;
   lostFrames = 0;
   /** Gets what the audio thread plays, once it is told { tap: true }; for tests and for pages that record. */
   onSamples: (samples: Float32Array, frame: number) => void = () => {};
@@ -22,7 +24,7 @@ export class Player {
    * Resolves when sound arrives at the audio thread.
    */
   start(scene = ''): Promise<void> {
-    this.worker = new Worker('/listen_worker.js', { type: 'module' });
+    this.worker = new Worker(new URL('./listen_worker.js', import.meta.url), { type: 'module' });
     const { worker } = this;
     const ready = new Promise<void>((resolve) => { this.playing = resolve; });
     worker.onmessage = async ({ data }: MessageEvent<ListenNews>) => {
@@ -57,7 +59,7 @@ export class Player {
       await this.context?.close();
       this.context = new AudioContext({ sampleRate: format.sampleRateHz, latencyHint: 'interactive' });
       const { context } = this;
-      await context.audioWorklet.addModule('/player_worklet.js');
+      await context.audioWorklet.addModule(new URL('./player_worklet.js', import.meta.url));
       if (this.context !== context) return;
       this.connect(context, format.channels);
     }
@@ -70,6 +72,7 @@ export class Player {
     this.node.port.onmessage = ({ data }) => {
       if (data.playing) this.playing();
       if (data.underruns) this.underruns = data.underruns;
+      if (data.target) this.target = data.target;
       if (data.samples) this.onSamples(data.samples, data.frame);
       else this.changed();
     };

@@ -71,7 +71,7 @@ class Player extends AudioWorkletProcessor {
       if (fill < this.target + TAPS) return true;
       this.playing = true;
       this.smoothed = fill;
-      this.port.postMessage({ playing: true });
+      this.port.postMessage({ playing: true, target: this.target });
     }
     if (fill > this.target + MOST_EXCESS) {
       ring.release(fill - this.target);
@@ -112,7 +112,7 @@ class Player extends AudioWorkletProcessor {
     this.playing = false;
     this.target += MORE;
     this.calm = 0;
-    this.port.postMessage({ underruns: this.underruns += 1 });
+    this.port.postMessage({ underruns: this.underruns += 1, target: this.target });
     return true;
   }
 
@@ -121,7 +121,10 @@ class Player extends AudioWorkletProcessor {
     this.leastSlack = Math.min(this.leastSlack, slack);
     this.calm += frames;
     if (this.calm < 3 * sampleRate) return;
-    if (this.leastSlack > MORE && this.target > LEAST_TARGET) this.target -= MORE / 2;
+    if (this.leastSlack > MORE && this.target > LEAST_TARGET) {
+      this.target -= MORE / 2;
+      this.port.postMessage({ target: this.target });
+    }
     this.calm = 0;
     this.leastSlack = Infinity;
   }

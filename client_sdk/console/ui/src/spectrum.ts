@@ -2,7 +2,7 @@
 import type { SoundingMode } from './modal_model';
 
 const LOW_HZ = 20, HIGH_HZ = 20000, SPAN_DB = 80;
-const MARGIN = { left: 44, right: 8, top: 8, bottom: 22 };
+const MARGIN = { left: 44, right: 16, top: 8, bottom: 22 };
 
 /** Draws the modes of a strike as bars over a logarithmic frequency, with their error bars to the left. */
 export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], kept: SoundingMode[], chosen?: number): void {

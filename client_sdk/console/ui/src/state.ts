@@ -175,9 +175,18 @@ function nearestVertex(of: ModalModel, [x, y, z]: Triple): number {
   return best;
 }
 
-/** The material as the daemon gets it; it finds Poisson's ratio in the model. */
+/** How far the frequencies of a body may be off, relative, because it was computed for another Poisson's ratio. */
+export const ratioError = computed(() => {
+  const header = model.value?.header, computedFor = header?.settings?.poissonRatio, wanted = material.value?.poissonRatio;
+  if (!header || computedFor === undefined || wanted === undefined) return 0;
+  // Torsion, which goes as (1 + nu)^(-1/2), is a bound where a model has no slopes.
+  const slopes = header.poissonSlopes.length ? header.poissonSlopes : [1 / (1 + computedFor)];
+  return Math.max(...slopes.map(Math.abs)) * Math.abs(wanted - computedFor) / 2;
+});
+
+/** The material as the daemon gets it: without its Poisson's ratio, so that the model's is taken, which a preset must not differ from. */
 function materialOfObject(): MessageInitShape<typeof MaterialSchema> {
-  if (factors.value === UNCHANGED || !material.value) return { preset: materialName.value };
+  if (!material.value) return { preset: materialName.value };
   const { youngPa, densityKgPerM3, alpha1S, alpha2PerS, lossFactor } = material.value;
   return { youngPa, densityKgPerM3, alpha1S, alpha2PerS, lossFactor };
 }

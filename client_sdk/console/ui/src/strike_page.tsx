@@ -155,6 +155,8 @@ function MaterialChoice() {
       onChange={(event) => choose(event.currentTarget.value)}>
       {[...state.materials.value].sort((a, b) => a.name.localeCompare(b.name)).map(({ name }) =>
         <option value={name}>{name.replaceAll('_', ' ')}{note(name)}</option>)}</select></label>
+    {state.ratioError.value > 0.001 && <p class="hint">The body was computed for a material with another Poisson’s ratio; of this one,
+      modes lie up to {(100 * state.ratioError.value).toFixed(1)} % elsewhere.</p>}
     <details><summary>Its figures</summary>
       {factor('young', 'Young’s modulus')}{factor('density', 'Density')}{factor('damping', 'Damping')}</details>
   </>;

@@ -43,5 +43,6 @@ export async function saveStrike(): Promise<void> {
   link.href = URL.createObjectURL(waveFile(blocks, rate, channels));
   link.download = 'strike.wav';
   link.click();
-  URL.revokeObjectURL(link.href);
+  // The browser reads the address after this function has ended.
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
