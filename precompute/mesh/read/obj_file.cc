@@ -68,16 +68,23 @@ class ObjParser {
     return line;
   }
 
+  /// The words of one line as they stand there: names of objects and materials may have blanks.
+  static std::string_view WholeOf(ObjWords words) {
+    if (words.empty()) return {};
+    const std::string_view last = words.back();
+    return {words[0].data(), static_cast<size_t>(last.data() + last.size() - words[0].data())};
+  }
+
   absl::Status Take(std::string_view statement, ObjWords words) {
     if (statement == "v") return TakeVertex(words);
     if (statement == "f" || statement == "fo") return TakeFace(words);
-    if (statement == "o") object_ = words.empty() ? "" : std::string(words[0]);
-    if (statement == "usemtl") material_ = words.empty() ? "" : std::string(words[0]);
-    if (statement == "o" || statement == "usemtl") file_.EnterRegion({object_, material_});
-    if (statement == "usemtl") return absl::OkStatus();
-    if (statement == "g" || statement == "o") {
-      EnterGroups(statement == "g" ? in_groups_ : in_object_,
-                  statement == "g" ? words : words.first(std::min<size_t>(words.size(), 1)));
+    if (statement == "g") EnterGroups(in_groups_, words);
+    if (statement == "g") return absl::OkStatus();
+    if (statement == "o" || statement == "usemtl") {
+      const std::string_view name = WholeOf(words);
+      (statement == "o" ? object_ : material_) = name;
+      file_.EnterRegion({object_, material_});
+      if (statement == "o") EnterGroups(in_object_, ObjWords(&name, words.empty() ? 0 : 1));
       return absl::OkStatus();
     }
     if (std::ranges::find(kObjRefused, statement) != std::end(kObjRefused)) {

@@ -55,20 +55,27 @@ void MoveNear(NamedMesh& named) {
       origin[0], origin[1], origin[2]));
 }
 
+/// Whether lines end by a carriage return alone, as those of old editors of the Macintosh and the
+/// headers of old binary PLY do.
+bool EndsLinesByReturn(const std::string& bytes) {
+  if (bytes.starts_with("ply\r")) return !bytes.starts_with("ply\r\n");
+  return bytes.find('\n') == std::string::npos && bytes.find('\r') != std::string::npos &&
+         bytes.find('\0') == std::string::npos;
+}
+
 /// Returns the text of a file whose characters or ends of lines no reader expects, and nothing if
-/// the bytes can be read as they are. Old editors of the Macintosh end lines by a carriage return
-/// alone.
+/// the bytes can be read as they are.
 std::optional<std::string> PlainText(const std::string& bytes) {
   std::optional<std::string> text = Utf8OfUtf16(bytes);
   const std::string_view unmarked = WithoutByteOrderMark(bytes);
   if (!text && unmarked.size() < bytes.size()) text = std::string(unmarked);
   const std::string& now = text ? *text : bytes;
-  const bool ends_lines_by_return = now.find('\n') == std::string::npos &&
-                                    now.find('\r') != std::string::npos &&
-                                    now.find('\0') == std::string::npos;
-  if (!ends_lines_by_return) return text;
+  if (!EndsLinesByReturn(now)) return text;
   std::string lines = now;
-  std::ranges::replace(lines, '\r', '\n');
+  const bool is_binary = lines.find("\rformat binary") != std::string::npos;
+  const size_t header = lines.find("\rend_header\r");
+  const size_t end = is_binary && header != std::string::npos ? header + 12 : lines.size();
+  std::replace(lines.begin(), lines.begin() + static_cast<ptrdiff_t>(end), '\r', '\n');
   return lines;
 }
 
@@ -82,7 +89,11 @@ absl::StatusOr<ElementFile> ParseElements(const std::string& bytes, const std::s
 
 absl::StatusOr<NamedMesh> ReadElements(const std::string& bytes, const std::string& format) {
   ASSIGN_OR_RETURN(ElementFile file, ParseElements(bytes, format));
-  return MakeMesh(std::move(file));
+  absl::StatusOr<NamedMesh> named = MakeMesh(std::move(file));
+  if (named.ok()) return named;
+  absl::Status refusal = named.status();
+  AddFigure(refusal, "repair_helps", "0");  // surfaces alone are repaired
+  return refusal;
 }
 
 }  // namespace

@@ -145,7 +145,8 @@ absl::StatusOr<SurfaceFile> ParseBinaryStl(std::string_view rest) {
   SurfaceFile file;
   file.has_numbers = false;
   for (bool first = true; first || rest.size() >= kStlHeader; first = false) {
-    if (rest.size() < kStlHeader)
+    // Numbers in binary have zero bytes.
+    if (rest.size() < kStlHeader || (first && rest.find('\0') == std::string_view::npos))
       return StlUnreadable("it begins neither with \"solid\" nor with a title of 80 bytes");
     const size_t count = TriangleCountOf(rest);
     file.EnterRegion({absl::StrCat(file.regions.size())});

@@ -76,10 +76,12 @@ std::vector<GltfMatrix> Joints(const GltfDocument& document, const Json& skin,
   return matrices;
 }
 
-/// Moves points by the joints of a skin. The node that has the skin does not move them.
+/// Moves points by the joints of a skin. The node that has the skin does not move them. Weights of
+/// eight bits rarely add up to one, so that each point is divided by the sum of its weights.
 void Bend(const GltfDocument& document, const std::vector<GltfMatrix>& joints,
           const Json& attributes, std::vector<GltfPoint>& points) {
   std::vector<GltfPoint> bent(points.size(), GltfPoint{0, 0, 0});
+  std::vector<double> sums(points.size());
   for (int set = 0; attributes.contains(absl::StrCat("JOINTS_", set)); ++set) {
     const auto of = document.Read<float>(attributes.at(absl::StrCat("JOINTS_", set)), "VEC4");
     const auto by = document.Read<double>(attributes.at(absl::StrCat("WEIGHTS_", set)), "VEC4");
@@ -93,9 +95,17 @@ void Bend(const GltfDocument& document, const std::vector<GltfMatrix>& joints,
       }
       const GltfPoint moved = Moved(joints[static_cast<size_t>(of[i])], points[i / 4]);
       for (size_t x = 0; x < 3; ++x) bent[i / 4][x] += by[i] * moved[x];
+      sums[i / 4] += by[i];
     }
   }
-  points = std::move(bent);
+  for (size_t p = 0; p < points.size(); ++p) {
+    if (!(sums[p] > 0)) {
+      throw GltfFault(absl::StrCat("vertex ", p,
+                                   " (counted from zero) has no weight for any joint of its skin: "
+                                   "export the body without its skin, or weigh all vertices"));
+    }
+    for (size_t x = 0; x < 3; ++x) points[p][x] = bent[p][x] / sums[p];
+  }
 }
 
 }  // namespace

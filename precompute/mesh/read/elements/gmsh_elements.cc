@@ -63,6 +63,18 @@ absl::Status GmshElements::Add(const GmshKind& kind, std::span<const int32_t> ph
     }
   }
   file.AddToGroups(groups, nodes.first(kind.corner_count));
+  const bool is_again = kind.type == last_type && std::ranges::equal(nodes, last_nodes);
+  last_type = kind.type;
+  last_nodes.assign(nodes.begin(), nodes.end());
+  if (is_again) {
+    const size_t pieces = kind.dimension == 2 ? Pieces(kind.type).size() : 0;
+    for (const std::string& name : groups) {
+      for (size_t t = file.triangles.size() - pieces; t < file.triangles.size(); ++t) {
+        file.Named(name).triangles.push_back(static_cast<int32_t>(t));
+      }
+    }
+    return absl::OkStatus();
+  }
   if (kind.dimension == 2) {
     std::vector<std::array<int64_t, 3>> triangles;
     for (const auto& [a, b, c] : Pieces(kind.type)) {

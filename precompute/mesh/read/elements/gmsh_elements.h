@@ -31,12 +31,15 @@ absl::Status UnknownGmshKind(int type);
 struct GmshElements {
   /// Adds an element to the file and to its physical groups. A group is identified by its name. A
   /// group without a name is identified by its number, unless it contains volumes, because numbers
-  /// of volumes stand for materials. Zero means no group.
+  /// of volumes stand for materials. Zero means no group. In MSH 2.2 Gmsh writes an element once
+  /// for each of its groups, one after the other; such an element is added once.
   absl::Status Add(const GmshKind& kind, std::span<const int32_t> physicals,
                    std::span<const int64_t> nodes);
 
   ElementFile file;
   std::map<std::array<int32_t, 2>, std::string> physical_names;  ///< by dimension and number
+  int last_type = 0;  ///< the type and nodes of the element that was added last
+  std::vector<int64_t> last_nodes;
 };
 
 }  // namespace carillon::precompute

@@ -63,7 +63,9 @@ class InpParser {
       RETURN_IF_ERROR(line[begin] == '*' ? Begin(line.substr(begin)) : Take(line.substr(begin)));
     }
     RETURN_IF_ERROR(EndBlock());
-    ASSIGN_OR_RETURN(ElementFile file, JoinBodies(TakeBodies(), assembly_sets_));
+    std::vector<InpBody> bodies = TakeBodies();
+    for (InpBody& body : bodies) WarnOfSolidSections(body.scope);
+    ASSIGN_OR_RETURN(ElementFile file, JoinBodies(std::move(bodies), assembly_sets_));
     file.warnings = std::move(warnings_);
     return file;
   }
@@ -100,6 +102,7 @@ class InpParser {
     }
     if (is_mesh && keyword_.Has("FILE")) return NotRead("FILE=");
     WarnOfCondition();
+    if (keyword_.name == "NSET" && keyword_.Has("ELSET")) TakeNodesOfElements();
     if (keyword_.name == "PART" || keyword_.name == "INSTANCE" || keyword_.name == "ASSEMBLY" ||
         keyword_.name.starts_with("END ")) {
       return ChangeScope();
@@ -108,6 +111,7 @@ class InpParser {
     if (keyword_.name == "NODE") return BeginNodes();
     if (keyword_.name == "ELEMENT") return BeginElements();
     if (keyword_.name == "SOLID SECTION") return TakeSection();
+    if (keyword_.name.ends_with(" SECTION")) WarnOfSection();
     return absl::OkStatus();
   }
 
@@ -123,6 +127,30 @@ class InpParser {
     const std::string warning = absl::StrCat("*", keyword_.name, " of the file (", lines_.place(),
                                              ") is not used; --fix fixes a body");
     if (warned_.insert(keyword_.name).second) warnings_.push_back(warning);
+  }
+
+  /// Sections of shells and the like give a thickness, which no body here has.
+  void WarnOfSection() {
+    if (!warned_.insert(keyword_.name).second) return;
+    warnings_.push_back(absl::StrCat("*", keyword_.name, " of the file (", lines_.place(),
+                                     ") is not used: the faces only bound a solid body; --wall "
+                                     "makes a closed surface hollow"));
+  }
+
+  void WarnOfSolidSections(InpScope& scope) {
+    for (const MeshRegion& section : scope.sections) {
+      const InpScope::Set* set = scope.FindSet(section.name);
+      const bool has_trusses =
+          set != nullptr && std::ranges::any_of(set->elements, [&](const InpMember& member) {
+            const auto element = scope.element_at.find(member.element);
+            return element != scope.element_at.end() &&
+                   scope.elements[element->second].kind.dimension == 1;
+          });
+      if (set != nullptr && !has_trusses) continue;
+      warnings_.push_back(absl::StrCat("the section of the set ", QuotedText(section.name),
+                                       " is not used, because the set ",
+                                       has_trusses ? "has trusses" : "is not there"));
+    }
   }
 
   /// *PART, *ASSEMBLY and *INSTANCE, and their ends.
@@ -264,8 +292,16 @@ class InpParser {
     if (!keyword_.Of("ELSET").empty()) {
       scope_->SetNamed(keyword_.Of("ELSET")).elements.push_back({number});
     }
-    if (!scope_->element_at.try_emplace(number, scope_->elements.size()).second) {
-      return lines_.Unreadable(absl::StrCat("element ", number, " is there twice"));
+    const auto [found, is_new] = scope_->element_at.try_emplace(number, scope_->elements.size());
+    if (!is_new) {
+      const InpScope::Element& first = scope_->elements[found->second];
+      const auto nodes = scope_->element_nodes.begin() + static_cast<ptrdiff_t>(first.first_node);
+      if (first.kind.node_count == kind_->node_count &&
+          std::equal(element.begin() + 1, element.end(), nodes)) {
+        return absl::OkStatus();
+      }
+      return lines_.Unreadable(
+          absl::StrCat("element ", number, " is there twice, with different nodes"));
     }
     scope_->elements.push_back({number, *kind_, scope_->element_nodes.size()});
     scope_->element_nodes.insert(scope_->element_nodes.end(), element.begin() + 1, element.end());
@@ -285,6 +321,22 @@ class InpParser {
       }
     }
     return absl::OkStatus();
+  }
+
+  /// "*NSET, NSET=nodes, ELSET=elements"
+  void TakeNodesOfElements() {
+    const InpScope::Set* found = scope_->FindSet(keyword_.Of("ELSET"));
+    if (found == nullptr) return WarnOfMissing(keyword_.Of("ELSET"), keyword_.Of("NSET"));
+    const std::vector<int64_t> numbers = NumbersOf(*found, false);
+    InpScope::Set& set = scope_->SetNamed(keyword_.Of("NSET"));
+    for (const int64_t number : numbers) {
+      const auto at = scope_->element_at.find(number);
+      if (at == scope_->element_at.end()) continue;
+      const InpScope::Element& element = scope_->elements[at->second];
+      const auto first = scope_->element_nodes.begin() + static_cast<ptrdiff_t>(element.first_node);
+      set.nodes.insert(set.nodes.end(), first,
+                       first + static_cast<ptrdiff_t>(element.kind.node_count));
+    }
   }
 
   /// "set or node" of a surface of nodes, and "set or element, S2" of a surface of faces. A surface
@@ -395,7 +447,10 @@ class InpParser {
         AddMemberOf(set.instance, name, n, of_nodes);
       }
     }
-    if (is_found) return;
+    if (!is_found) WarnOfMissing(other, name);
+  }
+
+  void WarnOfMissing(const std::string& other, const std::string& name) {
     warnings_.push_back(absl::StrCat(lines_.place(), ": the set ", QuotedText(other),
                                      " is not there, and was left out of ", QuotedText(name)));
   }

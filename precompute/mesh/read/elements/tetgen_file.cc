@@ -30,7 +30,8 @@ class TetgenParser {
   /// A line of whole numbers, at least `least` of them.
   absl::StatusOr<std::vector<int64_t>> NextFigures(size_t least, absl::string_view what) {
     std::vector<int64_t> figures;
-    for (const std::string_view word : lines_.NextWords()) {
+    words_ = lines_.NextWords();
+    for (const std::string_view word : words_) {
       // Attributes, which come last, need not be whole.
       const auto figure = ToNumber<int64_t>(word);
       if (!figure) break;
@@ -109,12 +110,18 @@ class TetgenParser {
       for (const size_t k : kMidsides) nodes.push_back(figures[1 + k]);
     }
     const auto attribute = static_cast<size_t>(node_count) + 1;
-    const std::string region =
-        figures.size() > attribute ? absl::StrCat(figures[attribute]) : std::string();
+    std::string region;
+    if (figures.size() > attribute) {
+      region = absl::StrCat(figures[attribute]);
+    } else if (words_.size() > attribute) {  // "2.0" is the region 2
+      const auto number = ToNumber<double>(words_[attribute]);
+      region = number ? absl::StrCat(*number) : std::string(words_[attribute]);
+    }
     return file_.AddTetrahedron(nodes, {region});
   }
 
   TextLines lines_;
+  std::vector<std::string_view> words_;  // of the line whose figures were taken last
   ElementFile file_;
 };
 

@@ -169,6 +169,24 @@ TEST_F(ReadGltfTest, ASkinIsBentAsItsJointsStand) {
   }
 }
 
+/// Weights of eight bits, of which a whole is 255, seldom add up to a whole.
+TEST_F(ReadGltfTest, WeightsOfASkinAreSharesOfTheirSum) {
+  Document document;
+  document.root()["nodes"] = {{{"mesh", 0}, {"skin", 0}}, {{"translation", {0, 0, 0}}}};
+  document.root()["skins"] = {{{"joints", {1, 1}}}};
+  document.primitive()["attributes"]["JOINTS_0"] =
+      document.Add<uint8_t>("VEC4", kUint8, {0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0});
+  const size_t weights = document.Add<uint8_t>(
+      "VEC4", kUint8, {127, 123, 0, 0, 200, 50, 0, 0, 9, 1, 0, 0, 255, 1, 0, 0});
+  document.root()["accessors"][weights]["normalized"] = true;
+  document.primitive()["attributes"]["WEIGHTS_0"] = weights;
+  EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 1.0 / 6, 1e-6);
+  document.primitive()["attributes"]["WEIGHTS_0"] =
+      document.Add<float>("VEC4", kFloat, {1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
+  EXPECT_THAT(Refused(document.Text(), "gltf"),
+              HasSubstr("vertex 1 (counted from zero) has no weight"));
+}
+
 TEST_F(ReadGltfTest, StripsAndFansAreTriangles) {
   Document strip;
   strip.primitive()["mode"] = 5;

@@ -139,7 +139,8 @@ TEST_F(ReadInpTest, WhatIsNotReadIsRefusedByName) {
       {flat + "*NGEN\n1, 2\n", "line 8: it has *NGEN"},
       {flat + "*End  Part\n*Ncopy, change number=10\n", "it has *NCOPY"},
       {flat + "*NODE\n1, 5,5,5\n", "line 9: node 1 is there twice, at different places"},
-      {flat + "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n", "line 9: element 1 is there twice"},
+      {flat + "*ELEMENT, TYPE=C3D4\n1, 2,1,3,4\n",
+       "line 9: element 1 is there twice, with different nodes"},
       {flat + "*ELEMENT, TYPE=B31\n2, 1,2\n",
        "MESH_ELEMENT_UNSUPPORTED: the file has elements of type B31 (line 8)"},
       {"*INSTANCE, NAME=a, PART=none\n", "an instance of the part \"none\", which is not there"},
@@ -167,6 +168,46 @@ TEST_F(ReadInpTest, ANodeThatIsThereTwiceAtOnePlaceIsOneNode) {
   EXPECT_EQ(ReadTetsOf(std::string(kNodes) + "*NODE, NSET=again\n1, 0., 0., 0.\n" + kElement, "inp")
                 .nodes.size(),
             4U);
+}
+
+TEST_F(ReadInpTest, AnElementThatIsThereTwiceIsOneElementOfBothSets) {
+  const absl::StatusOr<NamedMesh> read = ReadNamed(
+      std::string(kNodes) + kElement + "*ELEMENT, TYPE=C3D4, ELSET=again\n1, 1,2,3,4\n", "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(std::get<TetMesh>(read->mesh).element_count(), 1U);
+  ASSERT_EQ(read->names.groups.size(), 2U);
+  EXPECT_EQ(read->names.groups[0].simplices, read->names.groups[1].simplices);
+}
+
+TEST_F(ReadInpTest, ASetOfNodesMayBeThoseOfASetOfElements) {
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed(std::string(kNodes) + kElement + "*NSET, NSET=tip, ELSET=All\n", "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  ASSERT_EQ(read->names.groups.back().name, "tip");
+  EXPECT_EQ(read->names.groups.back().simplices.size(), 4U);
+  const absl::StatusOr<NamedMesh> without =
+      ReadNamed(std::string(kNodes) + kElement + "*NSET, NSET=tip, ELSET=none\n", "inp");
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_THAT(without->warnings, ElementsAre(HasSubstr("the set \"none\" is not there")));
+}
+
+// A closed shell is no solid; a body is not what sections of shells, of trusses and of sets that
+// are not there say.
+TEST_F(ReadInpTest, SectionsThatAreNotUsedAreNamed) {
+  const std::string faces =
+      "*ELEMENT, TYPE=S3, ELSET=skin\n2, 1,3,2\n3, 1,2,4\n4, 2,3,4\n5, 1,4,3\n";
+  const absl::StatusOr<NamedMesh> shell =
+      ReadNamed(kNodes + faces + "*SHELL SECTION, ELSET=skin, MATERIAL=Steel\n0.001, 5\n", "inp");
+  ASSERT_TRUE(shell.ok()) << shell.status();
+  EXPECT_THAT(shell->warnings, ElementsAre(HasSubstr("*SHELL SECTION of the file (line 11)")));
+  const absl::StatusOr<NamedMesh> solid =
+      ReadNamed(std::string(kNodes) + kElement + "*ELEMENT, TYPE=T3D2, ELSET=wire\n2, 1,2\n" +
+                    "*SOLID SECTION, ELSET=wire, MATERIAL=Steel\n"
+                    "*SOLID SECTION, ELSET=Heda, MATERIAL=Steel\n",
+                "inp");
+  ASSERT_TRUE(solid.ok()) << solid.status();
+  EXPECT_THAT(solid->warnings, ElementsAre(HasSubstr("\"wire\" is not used, because the set has"),
+                                           HasSubstr("\"Heda\" is not used, because the set is")));
 }
 
 TEST_F(ReadInpTest, ShellsBesideTheTetrahedraAreNamed) {

@@ -141,6 +141,20 @@ TEST_F(ReadVariantsTest, OffIsReadAsItsFirstWordSays) {
               HasSubstr("the file goes on after the 12 faces"));
 }
 
+TEST_F(ReadVariantsTest, NamesInAnObjMayHaveBlanks) {
+  const std::string obj = ToObj(box_);
+  const size_t middle = obj.find("\nf ", obj.size() - 60) + 1;
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed("o My box \nusemtl Brushed Steel\n" + obj.substr(0, middle) +
+                    "usemtl Brushed Wood  # the handle\n" + obj.substr(middle),
+                "obj");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->names.regions, ElementsAre(MeshRegion{"My box", "Brushed Steel"},
+                                               MeshRegion{"My box", "Brushed Wood"}));
+  ASSERT_EQ(read->names.groups.size(), 1U);
+  EXPECT_EQ(read->names.groups[0].name, "My box");
+}
+
 TEST_F(ReadVariantsTest, TextStlMayBeInCapitalsAndHaveSeveralSolids) {
   const std::string stl = ToTextStl(box_);
   ExpectBox(absl::AsciiStrToUpper(stl), "stl");
@@ -154,6 +168,8 @@ TEST_F(ReadVariantsTest, TextStlMayBeInCapitalsAndHaveSeveralSolids) {
   ExpectBox(stl + "\x1a", "stl");  // ends texts of DOS
   EXPECT_THAT(Refused(absl::StrReplaceAll(stl, {{"vertex 0 ", "vertex 0,0 "}}), "stl"),
               AllOf(HasSubstr("MESH_UNREADABLE"), HasSubstr("no vertex")));
+  EXPECT_THAT(Refused("# made by hand\n" + stl, "stl"),
+              HasSubstr("it begins neither with \"solid\" nor"));
 }
 
 TEST_F(ReadVariantsTest, BinaryStlMayBeginWithSolidAndEndWithMore) {
@@ -194,6 +210,37 @@ TEST_F(ReadVariantsTest, PlyMayHaveListsStripsAndOtherElements) {
               HasSubstr("the file goes on after the last element"));
   EXPECT_THAT(Refused(absl::StrReplaceAll(ToTextPly(box_), {{"\n3 0 ", "\n3 zero "}}), "ply"),
               HasSubstr("\"zero\" is no number"));
+}
+
+TEST_F(ReadVariantsTest, TheHeaderOfABinaryPlyMayEndItsLinesByCarriageReturns) {
+  std::string ply = ToBinaryPly(box_);
+  const size_t end = ply.find("end_header\n") + 11;
+  std::replace(ply.begin(), ply.begin() + static_cast<ptrdiff_t>(end), '\n', '\r');
+  ExpectBox(ply, "ply");
+}
+
+TEST_F(ReadVariantsTest, RegionsOfTetgenMayBeWrittenWithAPoint) {
+  const std::string nodes = "5 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n";
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed(nodes + "2 4 1\n1 1 2 3 4 1.0\n2 2 3 4 5 2.5\n", "node");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(read->names.regions, ElementsAre(MeshRegion{"1", ""}, MeshRegion{"2.5", ""}));
+}
+
+// Gmsh writes an element of two physical groups twice, with different numbers.
+TEST_F(ReadVariantsTest, AnElementOfTwoPhysicalGroupsIsThereOnce) {
+  const std::string file =
+      "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n3 1 \"whole\"\n3 2 \"steel\"\n"
+      "2 3 \"foot\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+      "$Elements\n4\n1 2 2 3 1 1 3 2\n2 2 2 4 1 1 3 2\n3 4 2 1 1 1 2 3 4\n4 4 2 2 1 1 2 3 4\n"
+      "$EndElements\n";
+  const absl::StatusOr<NamedMesh> read = ReadNamed(file, "msh");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(std::get<TetMesh>(read->mesh).element_count(), 1U);
+  std::vector<std::string> names;
+  for (const MeshGroup& group : read->names.groups) names.push_back(group.name);
+  EXPECT_THAT(names, ElementsAre("foot", "4", "whole", "steel"));
+  for (const MeshGroup& group : read->names.groups) EXPECT_EQ(group.simplices.size(), 1U);
 }
 
 TEST_F(ReadVariantsTest, SectionsOfGmshMayHaveBlanksAndBeUnknown) {
