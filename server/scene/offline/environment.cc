@@ -12,13 +12,13 @@ namespace {
 
 /// The shortest blocks into which a step is divided.
 constexpr size_t kShortBlock = 16;
-constexpr size_t kLongBlock = kOfflineBlockFrames;
 /// Most events of an environment that fall into the blocks rendered together.
 constexpr size_t kMostEvents = 512;
 
-/// Returns the largest divisor of a number of frames that suits a block, or zero.
+/// Returns the largest divisor of a number of frames that suits a block, or zero. The longer the
+/// blocks, the less often the fixed cost of a block comes up.
 size_t BlockThatDivides(size_t frame_count) {
-  for (size_t block = kLongBlock; block >= kShortBlock; --block) {
+  for (size_t block = kMostBlockFrames; block >= kShortBlock; --block) {
     if (frame_count % block == 0) return block;
   }
   return 0;
@@ -33,7 +33,7 @@ StepTiming TimingOf(const EnvironmentSettings& settings) {
   const bool whole = std::abs(step_frames - std::round(step_frames)) < 1e-6;
   // A step that is no whole number of frames may end a frame before its samples do.
   const size_t slack = whole ? 0 : 1;
-  if (asked >= kLongBlock - 1 + slack) return {kLongBlock, asked};
+  if (asked >= kOfflineBlockFrames - 1 + slack) return {kOfflineBlockFrames, asked};
   if (whole) {
     if (const size_t block = BlockThatDivides(static_cast<size_t>(std::llround(step_frames)))) {
       return {block, asked};
@@ -107,8 +107,14 @@ void Environment::Step(double time_scale, absl::FunctionRef<void(size_t, Contact
     read(microphone, intake);
     Follow(settings_.microphones[microphone], heard);
     intake.EndStep();
-    Render(frame_count, workspace, heard);
     const size_t channel_count = heard.renderer->settings().channel_count;
+    if (channel_count == 1 && heard.frames.empty() &&
+        frame_count % timing_.block_frame_count == 0) {
+      heard.renderer->Render(samples.first(frame_count), &workspace);
+      samples = samples.subspan(frame_count);
+      continue;
+    }
+    Render(frame_count, workspace, heard);
     for (size_t channel = 0; channel < channel_count; ++channel) {
       const float* from = heard.frames.data() + channel;
       for (float& sample : samples.first(frame_count)) {

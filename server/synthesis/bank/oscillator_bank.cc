@@ -157,7 +157,8 @@ void OscillatorBank::RenderAcceleration(BlockMix& mix) noexcept {
   std::array<float, kMostBlockFrames> sound{};
   moved_->RenderAdd(std::span(sound).first(block_frame_count_));
   const auto add = [&](LaneMix& lanes) {
-    for (size_t n = 0; n < block_frame_count_; ++n) lanes.frames()[n] += sound[n];
+    float* const frames = lanes.frames();
+    for (size_t n = 0; n < block_frame_count_; ++n) frames[n] += sound[n];
   };
   add(mix.lanes());
   if (gains_move()) add(mix.fading(block_frame_count_));
@@ -521,6 +522,7 @@ ring_kernel::TileSums OscillatorBank::Sums(NodeMix& nodes, size_t frame_count,
 
 void OscillatorBank::FinishPart(const ring_kernel::StruckPart& part,
                                 LaneMix& lanes) const noexcept {
+  if (!part.HasLongTiles()) return;
   float* frames = lanes.frames();
   part.batch.part_nodes.AddTo(part.begin, part.end, frames);
   for (size_t kind = 1; kind < kTileKinds; ++kind) {

@@ -18,6 +18,9 @@ class NodeMix {
  public:
   void Clear() noexcept { used_ = {}; }
 
+  /// Returns whether the nodes of any kind were used since Clear.
+  bool used() const noexcept { return used_ != std::array<bool, kTileKinds>{}; }
+
   /// Returns the nodes of the tiles of this kind that cover `frame_count` frames. The first use
   /// since Clear sets them to zero. Node k of tile i is at [(i * kClosedTileNodes + k) *
   /// kMostLanes].

@@ -76,6 +76,9 @@ struct StruckPart {
   bool by_frames = false;
   StrikeBatch& batch;
   size_t lane_count = 0;
+
+  /// Returns whether any lanes are rendered in tiles of the longer kinds.
+  bool HasLongTiles() const noexcept { return sums[1] != nullptr || sums[2] != nullptr; }
 };
 
 /// Initializes the start and fresh states (see LaneArrays) before the first part of a block that is

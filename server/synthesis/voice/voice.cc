@@ -222,17 +222,21 @@ float Voice::Sample(double delay_frames, size_t n) const noexcept {
 /// Renders without delay and cross-fade, in loops that compilers vectorise.
 void Voice::RenderHere(const Hearings& heard, std::span<float> frames) const noexcept {
   const size_t channels = settings_.channel_count;
-  const double step = 1 / static_cast<double>(input_.size());
+  const auto frame_count = static_cast<int>(input_.size());
   for (size_t channel = 0; channel < channels; ++channel) {
     const float from = heard[1].gains[channel], to = heard[2].gains[channel];
+    const float step = (to - from) / static_cast<float>(frame_count);
+    const float* const in = input_.data();
     float* const out = frames.data() + channel;
-    if (from == to) {
-      for (size_t n = 0; n < input_.size(); ++n) out[n * channels] += input_[n] * from;
-      continue;
-    }
-    for (size_t n = 0; n < input_.size(); ++n) {
-      const auto u = static_cast<float>(static_cast<double>(n) * step);
-      out[n * channels] += input_[n] * (from + u * (to - from));
+    const auto add = [=](size_t stride) {
+      for (int n = 0; n < frame_count; ++n) {
+        out[static_cast<size_t>(n) * stride] += in[n] * (from + static_cast<float>(n) * step);
+      }
+    };
+    if (channels == 1) {
+      add(1);
+    } else {
+      add(channels);
     }
   }
 }
