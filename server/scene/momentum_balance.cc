@@ -78,9 +78,15 @@ bool IsEqual(const MomentumBalance::Report& a, const MomentumBalance::Report& b)
 
 }  // namespace
 
+MomentumBalance::Body& MomentumBalance::BodyOfStep(uint32_t handle) {
+  Body& body = bodies_[handle];
+  if (!std::exchange(body.is_of_step, true)) of_step_.emplace_back(handle, &body);
+  return body;
+}
+
 void MomentumBalance::Move(uint32_t handle, const Vector3& centre_m,
                            const Quaternion& orientation) {
-  Body& body = bodies_[handle];
+  Body& body = BodyOfStep(handle);
   body.moves_now = true;
   body.orientation = orientation;
   // The velocity is that of the last step until EndStep knows the time.
@@ -90,8 +96,12 @@ void MomentumBalance::Move(uint32_t handle, const Vector3& centre_m,
 
 void MomentumBalance::EndStep(double time_s) {
   CountEqual();
-  for (const Report& report : reports_) bodies_[report.handle];
-  for (auto& [handle, body] : bodies_) AddStep(body, time_s);
+  for (const Report& report : reports_) BodyOfStep(report.handle);
+  for (const uint32_t handle : empty_touches_) {
+    if (bodies_.contains(handle)) BodyOfStep(handle);
+  }
+  std::ranges::sort(of_step_);
+  for (const auto& [handle, body] : of_step_) AddStep(*body, time_s);
   for (const Report& report : reports_) {
     Body& body = bodies_[report.handle];
     Step& step = body.steps.back();
@@ -105,23 +115,28 @@ void MomentumBalance::EndStep(double time_s) {
   }
   for (const uint32_t handle : empty_touches_) {
     const auto found = bodies_.find(handle);
-    if (found != bodies_.end() && !found->second.steps.empty()) {
-      found->second.steps.back().touches = true;
-    }
+    if (found != bodies_.end()) found->second.steps.back().touches = true;
   }
-  for (auto& [handle, body] : bodies_) EndStep(body, handle);
+  for (const auto& [handle, body] : of_step_) EndStep(*body, handle);
+  ++step_count_;
   if (bodies_.size() > kMostIdleBodies) {
-    std::erase_if(bodies_, [](const auto& entry) {
-      return std::ranges::none_of(entry.second.steps,
-                                  [](const Step& step) { return step.moved || step.touches; });
+    std::erase_if(bodies_, [this](const auto& entry) {
+      return entry.second.step_count + 2 * kStepCount < step_count_;
     });
   }
+  of_step_.clear();
   reports_.clear();
   empty_touches_.clear();
   time_s_ = time_s;
 }
 
 void MomentumBalance::AddStep(Body& body, double time_s) {
+  // The steps in which the body neither moved nor touched are empty.
+  if (!body.steps.empty() && body.step_count < step_count_) {
+    body.pose_count = 0;
+    body.steps.resize(body.steps.size() + std::min(step_count_ - body.step_count, kStepCount));
+  }
+  body.step_count = step_count_ + 1;
   Step step;
   const double since_s = time_s - time_s_.value_or(time_s - step_s_);
   const bool follows = since_s > 0 && since_s < 1.5 * step_s_;
@@ -131,15 +146,15 @@ void MomentumBalance::AddStep(Body& body, double time_s) {
   if (body.pose_count >= 2) step.velocity = Sum({}, body.velocity, 1 / since_s);
   step.moved = body.pose_count >= 3;
   if (step.moved) step.leap = Sum(step.velocity, before, -1);
-  if (body.steps.size() == 2 * kStepCount) {
-    body.steps.erase(body.steps.begin(), body.steps.begin() + kStepCount);
+  if (body.steps.size() >= 2 * kStepCount) {
+    body.steps.erase(body.steps.begin(), body.steps.end() - kStepCount);
   }
   body.steps.push_back(step);
 }
 
 void MomentumBalance::EndStep(Body& body, uint32_t handle) {
   Step& now = body.steps.back();
-  body.moves_now = false;
+  body.moves_now = body.is_of_step = false;
   if (body.steps.size() > 1) {
     const Step& before = body.steps[body.steps.size() - 2];
     const double size = Length(now.reported);

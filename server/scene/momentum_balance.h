@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/base/pose.h"
@@ -101,8 +102,10 @@ class MomentumBalance {
   struct Body {
     std::optional<Vector3> centre_m;
     Quaternion orientation{};
-    bool moves_now = false;  // whether the step has a pose
-    int pose_count = 0;      // in a row
+    bool moves_now = false;   // whether the step has a pose
+    bool is_of_step = false;  // whether the step has a pose or a contact
+    uint64_t step_count = 0;  // of the balance, after the newest of `steps`
+    int pose_count = 0;       // in a row
     Vector3 velocity{};
     bool flew = false;
     bool thrown = false;        // away from its partner, without an impulse
@@ -119,6 +122,7 @@ class MomentumBalance {
     uint64_t right_count = 0, lost_count = 0, stale_count = 0;
   };
 
+  Body& BodyOfStep(uint32_t handle);
   void AddStep(Body& body, double time_s);
   void EndStep(Body& body, uint32_t handle);
   void NoteFlight(Body& body);
@@ -155,6 +159,8 @@ class MomentumBalance {
   const double step_s_;
   const bool scene_frame_;
   std::map<uint32_t, Body> bodies_;
+  std::vector<std::pair<uint32_t, Body*>> of_step_;  // the bodies that move or touch in the step
+  uint64_t step_count_ = 0;
   std::vector<Report> reports_;          // of the step
   std::vector<uint32_t> empty_touches_;  // of the step
   std::vector<Vector3> flights_;         // accelerations of bodies without contact, m/s^2
