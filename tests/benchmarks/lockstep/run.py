@@ -32,13 +32,14 @@ class Python:
     def __init__(self, client):
         self.client = client
 
-    def run(self, model, case, seconds):
+    def run(self, model, case, seconds, begin):
         from performed import STEPS_BEFORE, Performed
         environments, bodies, _, step_s = case
         performed = Performed(self.client, model, environments, bodies, step_s)
         with performed.sound:
             for number in range(STEPS_BEFORE):
                 performed.step(number)
+            begin()
             begun, cpu_before_s, count, loudest = time.perf_counter(), time.process_time(), 0, 0.0
             while time.perf_counter() - begun < seconds:
                 loudest = max(loudest, performed.step(STEPS_BEFORE + count).max())
@@ -53,22 +54,24 @@ class Cpp:
     def __init__(self, program, server):
         self.program, self.server = program, server
 
-    def run(self, model, case, seconds):
+    def run(self, model, case, seconds, begin):
         environments, bodies, _, step_s = case
         words = [self.program, self.server, model.name, *map(str, (environments, bodies, step_s, seconds)), os.devnull]
-        return json.loads(subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout)
+        with subprocess.Popen(words, stdout=subprocess.PIPE) as process:
+            assert process.stdout.readline() == b"begun\n"
+            begin()
+            return json.loads(process.stdout.readline())
 
 
 def measure(daemon, language, client, model, case, seconds):
-    before = cpu_s(daemon.process.pid)
-    found = client.run(model, case, seconds)
+    before = []
+    found = client.run(model, case, seconds, lambda: before.append(cpu_s(daemon.process.pid)))
+    daemon_s = cpu_s(daemon.process.pid) - before[0]
     assert found["loudest"] > 0, "nothing was heard"
     environments, bodies, modes, step = case
     each = 1e6 / found["steps"] / environments  # from seconds in all to us of each environment and step
-    # The daemon's share contains 20 steps more, in which it makes what the environments need.
-    daemon_share = (cpu_s(daemon.process.pid) - before) * each * found["steps"] / (found["steps"] + 20)
     cells = (language, environments, bodies, modes, 1000 * step, f"{found['steps'] * step / found['seconds']:.2f}",
-             f"{1e6 * found['seconds'] / found['steps']:.0f}", f"{daemon_share + found['cpu_s'] * each:.1f}",
+             f"{1e6 * found['seconds'] / found['steps']:.0f}", f"{(daemon_s + found['cpu_s']) * each:.1f}",
              f"{found['cpu_s'] * each:.1f}")
     print(f"| {' | '.join(map(str, cells))} |", flush=True)
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Performs environments for some seconds, prints the number of steps and the time they took, and
-// writes the samples of the first steps to a file.
+// Performs environments for some seconds, and writes the samples of the first steps to a file.
+// Prints a line when it begins to measure, and one with the number of steps and the time they took.
 // Usage: performed SERVER MODEL ENVIRONMENTS BODIES STEP_S SECONDS FILE
 // In each step every body of every environment has a pose, and one of them is struck.
 
@@ -104,6 +104,7 @@ absl::Status WriteFirstSteps(const Case& own, const char* file, Performance& per
 absl::Status Measure(const Case& own, double seconds, Performance& performance) {
   float loudest = 0;
   uint64_t count = 0;
+  std::cout << "begun\n" << std::flush;
   const double cpu_before_s = CpuS();
   const steady_clock::time_point begin = steady_clock::now();
   std::chrono::duration<double> passed{};

@@ -26,7 +26,8 @@ class PerformedTest(DaemonTest):
             with performed.sound:
                 expected = [performed.step(number).tobytes() for number in range(STEPS_BEFORE)]
             words = [PROGRAM, self.daemon.server, model.name, "3", "2", repr(1 / 90), "0.1", samples]
-            found = json.loads(subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout)
+            printed = subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout
+            found = json.loads(printed.splitlines()[-1])
         self.assertGreater(abs(numpy.frombuffer(b"".join(expected), numpy.float32)).max(), 0.01)
         self.assertEqual(samples.read_bytes(), b"".join(expected))
         self.assertGreater(found["steps"], 0)
