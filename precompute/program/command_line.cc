@@ -14,7 +14,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
-#include "precompute/fem/elastic_constants.h"
 #include "precompute/pipeline/worker_request.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
@@ -32,7 +31,6 @@ struct Options {
   std::vector<std::string> materials;
   std::string band;
   std::optional<double> young_pa, poisson_ratio, density_kg_per_m3, alpha1_s, alpha2_per_s;
-  std::optional<double> lambda_pa, mu_pa;
   std::string loss_factor;
 };
 
@@ -68,9 +66,6 @@ void AddMaterialOptions(CLI::App& app, Options& options) {
   app.add_option("--young", options.young_pa, "Young's modulus, Pa")->group(group);
   app.add_option("--poisson", options.poisson_ratio, "Poisson's ratio, above -1 and below 0.5")
       ->group(group);
-  app.add_option("--lame-lambda", options.lambda_pa, "Lame's first constant, Pa, with --lame-mu")
-      ->group(group);
-  app.add_option("--lame-mu", options.mu_pa, "Shear modulus, Pa, with --lame-lambda")->group(group);
   app.add_option("--density", options.density_kg_per_m3, "Density, kg/m^3")->group(group);
   app.add_option("--alpha1", options.alpha1_s, "Damping in proportion to stiffness, s")
       ->group(group);
@@ -170,26 +165,6 @@ void AddOptions(CLI::App& app, Options& options, CommandLine& result) {
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
-/// Young's modulus and Poisson's ratio, from either pair of constants.
-absl::Status SetElasticity(const Options& options, v1::Material& material) {
-  if (options.lambda_pa.has_value() != options.mu_pa.has_value()) {
-    return InvalidOption("--lame-lambda and --lame-mu belong together; give both");
-  }
-  if (options.lambda_pa && (options.young_pa || options.poisson_ratio)) {
-    return InvalidOption(
-        "--lame-lambda and --lame-mu say the same as --young and --poisson; give one pair");
-  }
-  if (options.lambda_pa) {
-    const ElasticConstants elastic =
-        FromLame({.lambda_pa = *options.lambda_pa, .mu_pa = *options.mu_pa});
-    material.set_young_pa(elastic.young_pa);
-    material.set_poisson_ratio(elastic.poisson_ratio);
-  }
-  if (options.young_pa) material.set_young_pa(*options.young_pa);
-  if (options.poisson_ratio) material.set_poisson_ratio(*options.poisson_ratio);
-  return absl::OkStatus();
-}
-
 /// Checks that a material without a preset has all figures without a default.
 absl::Status CheckComplete(const v1::Material& material) {
   if (!material.preset().empty()) return absl::OkStatus();
@@ -201,9 +176,7 @@ absl::Status CheckComplete(const v1::Material& material) {
   constexpr size_t kAll = 3;
   return InvalidOption(absl::StrCat(
       missing.size() == kAll ? "no material" : "the material is not complete", ": give ",
-      absl::StrJoin(missing, ", "),
-      missing.front() == "--density" ? "" : " (or --lame-lambda and --lame-mu for the elasticity)",
-      ", or --material NAME"));
+      absl::StrJoin(missing, ", "), ", or --material NAME"));
 }
 
 /// A field of a material, and the option that sets it.
@@ -246,7 +219,8 @@ absl::StatusOr<v1::Material> MakeMaterial(const Options& options) {
     if (!is_region) material.set_preset(text);
   }
   const bool is_named = !options.materials.empty();
-  RETURN_IF_ERROR(SetElasticity(options, material));
+  if (options.young_pa) material.set_young_pa(*options.young_pa);
+  if (options.poisson_ratio) material.set_poisson_ratio(*options.poisson_ratio);
   if (options.density_kg_per_m3) material.set_density_kg_per_m3(*options.density_kg_per_m3);
   if (options.alpha1_s || !is_named) {
     material.set_alpha1_s(options.alpha1_s.value_or(0));

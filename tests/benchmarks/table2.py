@@ -95,8 +95,8 @@ def solve(program, length, element, around, along):
         write_tube(surface, length, around, along)
         run = subprocess.run(
             [program, str(surface), "--out", str(pathlib.Path(folder, "tube.modes")), "--json",
-             "--element", element, "--keep-surface", "--lame-lambda", str(LAMBDA_PA),
-             "--lame-mu", str(MU_PA), "--density", str(DENSITY), "--band", "20:2500"],
+             "--element", element, "--keep-surface", "--young", str(YOUNG_PA), "--poisson", str(POISSON),
+             "--density", str(DENSITY), "--band", "20:2500"],
             stdout=subprocess.PIPE, check=False)
     report = json.loads(run.stdout)
     if run.returncode != 0:

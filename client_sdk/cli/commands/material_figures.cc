@@ -48,14 +48,6 @@ absl::StatusOr<v1::Material> ToOneMaterial(const MaterialFigures& figures) {
     ASSIGN_OR_RETURN(const auto points, ReadLossFactor(figures.loss_factor));
     SetLossFactor(points, material);
   }
-  if (!figures.lame_lambda_pa && !figures.lame_mu_pa) return material;
-  if (!figures.lame_lambda_pa || !figures.lame_mu_pa || figures.young_pa || figures.poisson_ratio) {
-    return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
-                   "give --young and --poisson, or both --lame-lambda and --lame-mu");
-  }
-  const double lambda = *figures.lame_lambda_pa, mu = *figures.lame_mu_pa;
-  material.set_young_pa(mu * (3 * lambda + 2 * mu) / (lambda + mu));
-  material.set_poisson_ratio(lambda / (2 * (lambda + mu)));
   return material;
 }
 

@@ -18,19 +18,14 @@ struct MaterialFigures {
   std::vector<std::string> regions;  ///< "REGION=NAME", a named material for each
   std::optional<double> young_pa;
   std::optional<double> poisson_ratio;
-  std::optional<double> lame_lambda_pa;
-  std::optional<double> lame_mu_pa;
   std::optional<double> density_kg_per_m3;
   std::optional<double> alpha1_s;
   std::optional<double> alpha2_per_s;
   std::string loss_factor;  ///< text for ReadLossFactor; empty: none
 };
 
-/// Converts the figures to the message of the contract. Lamé's constants become
-/// E = mu (3 lambda + 2 mu)/(lambda + mu) and nu = lambda/(2 (lambda + mu)). Errors:
-/// InvalidArgument (INVALID_MATERIAL) if only one of Lamé's constants is given, or if they are
-/// given together with Young's modulus or Poisson's ratio, or if the file is no Material; NotFound
-/// (FILE_NOT_FOUND).
+/// Converts the figures to the message of the contract. Errors: InvalidArgument (INVALID_MATERIAL)
+/// if the file is no Material, or the loss factor is malformed; NotFound (FILE_NOT_FOUND).
 absl::StatusOr<v1::Material> ToMaterial(const MaterialFigures& figures);
 
 /// Returns the name of a material, with the figures that override its own, or the figures alone.

@@ -39,8 +39,6 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
       ->group("Material");
   AddFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
   AddFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
-  AddFigure(app, "--lame-lambda", material.lame_lambda_pa, "Lame's first constant, Pa");
-  AddFigure(app, "--lame-mu", material.lame_mu_pa, "Lame's second constant, Pa");
   AddFigure(app, "--density", material.density_kg_per_m3, "Density, kg/m^3");
   AddFigure(app, "--alpha1", material.alpha1_s,
             "Damping in proportion to stiffness, s; it replaces a loss factor");

@@ -70,7 +70,7 @@ class Material:
                 "alpha1_s": self.alpha1, "alpha2_per_s": self.alpha2}
 
     def options(self):
-        figures = {"--lame-lambda": self.lame_lambda, "--lame-mu": self.lame_mu, "--density": self.density,
+        figures = {"--young": self.young_pa, "--poisson": self.poisson, "--density": self.density,
                    "--alpha1": self.alpha1, "--alpha2": self.alpha2}
         return [str(word) for pair in figures.items() for word in pair]
 

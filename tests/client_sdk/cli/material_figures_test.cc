@@ -7,24 +7,6 @@
 namespace carillon::cli {
 namespace {
 
-TEST(MaterialFigures, LameConstantsBecomeTheYoungAndPoissonThatGiveThemBack) {
-  MaterialFigures figures;
-  figures.lame_lambda_pa = 4.98e10;
-  figures.lame_mu_pa = 2.57e10;
-  const auto material = ToMaterial(figures);
-  ASSERT_TRUE(material.ok()) << material.status();
-  const double young = material->young_pa(), nu = material->poisson_ratio();
-  // Rounding only: the formulas are each other's exact inverse.
-  EXPECT_NEAR(young * nu / ((1 + nu) * (1 - 2 * nu)), 4.98e10, 1);
-  EXPECT_NEAR(young / (2 * (1 + nu)), 2.57e10, 1);
-}
-
-TEST(MaterialFigures, OneLameConstantAloneIsRefused) {
-  MaterialFigures figures;
-  figures.lame_mu_pa = 2.57e10;
-  EXPECT_THAT(ToMaterial(figures).status().ToString(), testing::HasSubstr("INVALID_MATERIAL: "));
-}
-
 TEST(MaterialFigures, ALossFactorIsOneNumberOrATable) {
   MaterialFigures figures;
   figures.loss_factor = "0.002";
