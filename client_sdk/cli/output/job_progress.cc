@@ -14,7 +14,6 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/output/output.h"
-#include "proto/cpp/limits.h"
 #include "proto/cpp/program/escaped_text.h"
 
 namespace carillon::cli {
@@ -109,13 +108,6 @@ void DrawProgressBar(const v1::Job& job) {
                 std::string(filled, '#'), std::string(kBarWidth - filled, '.'), ProgressText(job));
 }
 
-void WarnOfUnit(const v1::Job& job, bool terminal) {
-  absl::FPrintF(stderr,
-                "%swarning: the body is %.3g m across; if its file is in another unit than metres, "
-                "cancel the job (carillon job cancel %s) and state the unit, such as --unit mm\n",
-                terminal ? "\r\033[K" : "", job.progress().extent_m(), ShortName(job));
-}
-
 }  // namespace
 
 absl::string_view ShortName(const v1::Job& job) {
@@ -155,12 +147,7 @@ std::string RoughTime(double seconds) {
 absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   std::string shown;
-  bool warned = false;
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
-    if (!warned && state.progress().extent_m() > kLikelyExtentM) {
-      warned = true;
-      WarnOfUnit(state, terminal);
-    }
     if (terminal) {
       DrawProgressBar(state);
     } else if (Activity(state) != shown) {
