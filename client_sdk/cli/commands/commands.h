@@ -127,6 +127,7 @@ struct RenderOptions {
   std::optional<double> full_scale_pa;  ///< pressure of a sample of 1; absent: the daemon's default
   bool normalize = false;  ///< scale the sound to a peak of 0.9 of full scale, before `gain`; a
                            ///< soft sound is first rendered again with a finer full scale
+  std::string html;        ///< a page to write, too; empty for none
   int bits = 24;           ///< of a sample: 16, 24, or 32 for floating point
   std::optional<double> length_s;  ///< of the file: a longer sound is cut, and a shorter one is
                                    ///< followed by silence; absent: that of the sound
@@ -190,6 +191,8 @@ struct ConsoleOptions {
   bool browser = true;   ///< whether to open a browser where there is a desktop
 };
 
+/// Returns the path of a program of Carillon: beside this one, or else its name, for PATH.
+std::string PathOfCompanion(const std::string& name);
 /// Starts the daemon, if none listens at the program's Unix socket, and the console; prints the
 /// console's address, and opens it in a browser. Returns after a stop. Errors: Aborted
 /// (PROGRAM_ENDED).

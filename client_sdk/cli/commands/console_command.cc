@@ -37,7 +37,7 @@ class Companion {
   /// Returns once the program has printed a line. Its errors go to stderr. Errors:
   /// Aborted (PROGRAM_ENDED).
   static absl::StatusOr<Companion> Start(const std::string& name, std::vector<std::string> words) {
-    words.insert(words.begin(), PathOf(name));
+    words.insert(words.begin(), PathOfCompanion(name));
     ASSIGN_OR_RETURN(Pipe output, Pipe::Make());
     absl::StatusOr<ChildProcess> child = ChildProcess::Start(
         {.words = words, .output = output.write_end(), .errors = STDERR_FILENO});
@@ -69,13 +69,6 @@ class Companion {
  private:
   explicit Companion(Pipe output) : output_(std::move(output)) {}
 
-  /// Returns the program beside this one, or else the name, for PATH.
-  static std::string PathOf(const std::string& name) {
-    std::error_code error;
-    const fs::path beside = fs::read_symlink("/proc/self/exe", error).replace_filename(name);
-    return fs::exists(beside, error) ? beside.string() : name;
-  }
-
   Pipe output_;  // open, so that the program can go on printing
   std::optional<ChildProcess> child_;
   std::string line_;
@@ -105,6 +98,12 @@ bool HasDesktop() {
 }
 
 }  // namespace
+
+std::string PathOfCompanion(const std::string& name) {
+  std::error_code error;
+  const fs::path beside = fs::read_symlink("/proc/self/exe", error).replace_filename(name);
+  return fs::exists(beside, error) ? beside.string() : name;
+}
 
 absl::Status RunConsole(const Program& program, const ConsoleOptions& options,
                         const StopSignal& stop) {

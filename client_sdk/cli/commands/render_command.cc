@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/commands/trace_page.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
@@ -157,13 +158,17 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
                     std::vector<JsonMember> members) {
   RenderedFile file(FormOf(options, options.out));
   v1::ContactTraceHeader header;
+  RenderedTrace page{.trace = options.trace, .wave = options.out};
   const auto render = [&](const v1::RenderSettings& settings) -> absl::StatusOr<v1::RenderSummary> {
     ASSIGN_OR_RETURN(auto trace, client::ContactTraceReader::Open(options.trace));
     header = trace.header();
-    return daemon.Render(settings, trace,
-                         [&](const client::AudioBlock& block) { return file.Take(block); });
+    page.blows.Clear();
+    return daemon.Render(
+        settings, trace, [&](const client::AudioBlock& block) { return file.Take(block); },
+        [&](const v1::Blow& blow) { *page.blows.add_blows() = blow; });
   };
   v1::RenderSettings settings = SettingsOf(options);
+  settings.set_tell_blows(!options.html.empty());
   auto summary = render(settings);
   // A trace that comes through a pipe cannot be read twice.
   const bool rereadable = std::filesystem::is_regular_file(options.trace);
@@ -177,6 +182,10 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
   RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
+  if (!options.html.empty()) {
+    page.summary = *summary;
+    RETURN_IF_ERROR(WriteTracePage(daemon, page, options.html));
+  }
   if (json) {
     PrintRenderingJson(options, *summary, file, header, std::move(members));
   } else {

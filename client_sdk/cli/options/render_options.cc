@@ -94,6 +94,11 @@ bool IsFolder(const std::string& path) {
   return std::filesystem::is_directory(path, ignored);
 }
 
+bool IsFile(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
 std::string WhyNoFolder(const std::string& out) {
   std::error_code ignored;
   if (out != "-" && (!std::filesystem::exists(out, ignored) || IsFolder(out))) return "";
@@ -108,6 +113,10 @@ void CheckUse(const CLI::App& render, const RenderOptions& options) {
     throw CLI::ValidationError(option,
                                absl::StrCat("is for a folder of traces, and \"", options.trace,
                                             "\" is none; name a folder, or leave the option out"));
+  }
+  if (!options.html.empty() && (options.out == "-" || !IsFile(options.trace))) {
+    throw CLI::ValidationError(
+        "--html", "needs a trace in a file, and a file for --out: the page has both in it");
   }
   const std::string wrong =
       is_folder ? WhyNoFolder(options.out) : WhyNotWritten(options.out, {".wav", ".wave"});
@@ -127,6 +136,10 @@ void AddRender(CLI::App& app, Program& program) {
       .add_option("--out", options->out,
                   "The WAV file to write, or - for stdout; the folder for a folder")
       ->required();
+  render.add_option(
+      "--html", options->html,
+      "Also write a page of one file, which shows the bodies, their motion and blows, "
+      "and plays the sound in any browser");
   AddSound(render, *options);
   AddFolder(render, *options);
   render.callback([&program, &render, options] {

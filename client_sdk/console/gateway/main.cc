@@ -14,6 +14,7 @@
 #include <string>
 
 #include "client_sdk/console/gateway/http_connection.h"
+#include "client_sdk/console/gateway/web_pages.h"
 #include "proto/cpp/server_address.h"
 
 namespace {
@@ -78,6 +79,13 @@ int main(int argc, char** argv) {
   std::string pages;
   app.add_option("--pages", pages, "A folder of your own pages, which are served below /pages/")
       ->check(CLI::ExistingDirectory);
+  app.add_flag_callback(
+      "--trace-page",
+      [] {
+        std::cout << carillon::console::TracePage();
+        throw CLI::Success();
+      },
+      "Print the page into which `carillon render --html` puts a trace");
   app.set_version_flag("--version", CARILLON_VERSION);
   CLI11_PARSE(app, argc, argv);
   return Serve(server, port, pages);

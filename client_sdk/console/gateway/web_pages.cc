@@ -11,17 +11,18 @@ namespace {
 #define CARILLON_EMBED(symbol, file)                                                            \
   __asm__(".pushsection .rodata\n.global carillon_" #symbol "_begin\n.global carillon_" #symbol \
           "_end\ncarillon_" #symbol "_begin:\n.incbin \"" CARILLON_CONSOLE_PAGES "/" file       \
-          ".gz\"\ncarillon_" #symbol "_end:\n.byte 0\n.popsection\n");                          \
+          "\"\ncarillon_" #symbol "_end:\n.byte 0\n.popsection\n");                             \
   extern "C" const char carillon_##symbol##_begin[];                                            \
   extern "C" const char carillon_##symbol##_end[]
 
-CARILLON_EMBED(index_html, "index.html");
-CARILLON_EMBED(style_css, "style.css");
-CARILLON_EMBED(main_js, "main.js");
-CARILLON_EMBED(listen_worker_js, "listen_worker.js");
-CARILLON_EMBED(shared_js, "shared.js");
-CARILLON_EMBED(player_worklet_js, "player_worklet.js");
-CARILLON_EMBED(licences_txt, "licences.txt");
+CARILLON_EMBED(index_html, "index.html.gz");
+CARILLON_EMBED(style_css, "style.css.gz");
+CARILLON_EMBED(main_js, "main.js.gz");
+CARILLON_EMBED(listen_worker_js, "listen_worker.js.gz");
+CARILLON_EMBED(shared_js, "shared.js.gz");
+CARILLON_EMBED(player_worklet_js, "player_worklet.js.gz");
+CARILLON_EMBED(licences_txt, "licences.txt.gz");
+CARILLON_EMBED(trace_file_html, "trace_file.html");
 
 #undef CARILLON_EMBED
 
@@ -52,6 +53,10 @@ const WebPage* FindWebPage(std::string_view path) {
     if (page.path == path) return &page;
   }
   return nullptr;
+}
+
+std::string_view TracePage() {
+  return Between(carillon_trace_file_html_begin, carillon_trace_file_html_end);
 }
 
 }  // namespace carillon::console

@@ -15,4 +15,7 @@ struct WebPage {
 /// Returns the file at `path`, or null. "/" is the page.
 const WebPage* FindWebPage(std::string_view path);
 
+/// Returns the page that shows and plays a trace, which lacks the trace. It is not compressed.
+std::string_view TracePage();
+
 }  // namespace carillon::console

@@ -32,6 +32,15 @@ bundle() {
 # What the page and its worker have in common is one file.
 bundle "$folder" src/main.tsx src/listen_worker.ts --splitting --chunk-names=shared
 bundle "$folder" src/player_worklet.ts
+# The page that is mailed has all in one file, with the notices of its libraries.
+bundle . src/trace_file.tsx --legal-comments=inline
+{
+  printf '<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<title>Carillon</title>\n<style>\n'
+  cat style.css
+  printf '</style>\n<script type="module">\n'
+  cat trace_file.js
+  printf '</script>\n'
+} >"$folder/trace_file.html"
 bundle web src/web.ts src/listen_worker.ts --splitting --chunk-names=shared
 bundle web src/player_worklet.ts
 node node_modules/typescript/bin/tsc --project tsconfig.web.json

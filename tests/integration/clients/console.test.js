@@ -380,7 +380,22 @@ test('a running simulator is seen, and why it is silent', { timeout: 400000 }, (
   await page.getByRole('button', { name: 'Unmute' }).press('Enter');
   await page.waitForFunction(() => carillonConsole.live.scene.value.muted === false);
   await page.waitForFunction(() => !document.querySelector('.chain .broken'));
+  // A click in the spectrogram finds the blow that is heard there, and the step that made it.
+  const { played, rendered } = await page.evaluate(async () => {
+    const played = carillonConsole.player.playedS();
+    const { frameCount, format } = await carillonConsole.state.services.audio.getMixer({});
+    return { played, rendered: Number(frameCount) / format.sampleRateHz };
+  });
+  assert.ok(played < rendered && rendered - played < 5, `${played} s are played, ${rendered} s rendered`);
+  const spectrogram = await page.locator('.spectrogram:visible').boundingBox();
+  const origin = page.locator('.origin');
+  // A busy machine has the simulator strike less often.
+  while (!await origin.count()) {
+    await page.mouse.click(spectrogram.x + spectrogram.width - 20, spectrogram.y + 20);
+    await page.waitForTimeout(300);
+  }
   await page.evaluate(() => { carillonConsole.live.watching.value = false; });
+  assert.match(await origin.textContent(), /on body [123], point .* mm .*, 0\.020 N s, from the step at about -?\d+\.\d+ s/);
   await keepPicture(page, 'console_live.png');
   assert.deepEqual(await accessibilityFaults(page), []);
 }));
@@ -395,6 +410,51 @@ test('the models are listed with their pictures, and the space bar lets one be h
   await keepPicture(page, 'console_models.png');
   assert.deepEqual(await accessibilityFaults(page), []);
 }));
+
+/** What is played of a trace, in its view and in its page alike. */
+async function checkTrace(page) {
+  await page.waitForFunction(() => (globalThis.carillonTrace ?? globalThis.carillonConsole?.trace)?.trace.value);
+  const { blows, labels, seconds, rate } = await page.evaluate(() => {
+    globalThis.shown = globalThis.carillonTrace ?? carillonConsole.trace;
+    const one = shown.trace.value;
+    return { blows: one.blows.map((blow) => [blow.object, blow.timeS]), labels: [...one.labels.values()],
+      seconds: one.sound.duration, rate: one.sound.sampleRate };
+  });
+  assert.deepEqual(labels, ['left', 'right</script>']);
+  assert.deepEqual(blows.map(([object]) => object), [1, 2, 1, 2, 1, 2]);
+  blows.forEach(([, time], i) => assert.ok(Math.abs(time - 0.1 * i) < 0.005, `${time} s`));
+  assert.ok(seconds > 0.7 && rate === 48000, `${seconds} s`);
+  // The sound begins to be loud at each blow, as the time line draws it.
+  const rises = await page.evaluate(() => {
+    const samples = shown.trace.value.sound.getChannelData(0);
+    const energy = (from) => samples.slice(from, from + 480).reduce((sum, sample) => sum + sample * sample, 0);
+    return [1, 2, 3, 4, 5].map((i) => energy(4800 * i + 48) / (energy(4800 * i - 600) + 1e-20));
+  });
+  assert.ok(rises.every((rise) => rise > 10), `${rises}`);
+  const box = await page.locator('.line').boundingBox();
+  await page.mouse.click(box.x + 110 + (box.width - 110) * 0.5 / seconds, box.y + 30);
+  const poses = await page.evaluate(() => shown.objects.value.map(({ pose }) => pose.positionM.y));
+  assert.ok(Math.abs(poses[0] - 0.5) < 1e-3 || Math.abs(poses[0] - 0.4) < 1e-3, `${poses}`);
+  assert.ok(await variance(page, '.scene', 'trace_bodies.png') > 2);
+  assert.ok(await variance(page, '.line', 'trace_line.png') > 100);
+  await page.locator('.line').press('Space');
+  await page.waitForFunction(() => shown.timeS.value > 0.6);
+  assert.deepEqual(await accessibilityFaults(page), []);
+}
+
+test('a trace is rendered, seen and played, and saved as a sound', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.getByRole('link', { name: 'Trace' }).click();
+  await page.locator('main:visible input[type=file]').setInputFiles(process.env.CARILLON_TEST_TRACE);
+  await checkTrace(page);
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Save WAV').last().click()]);
+  assert.equal(fs.readFileSync(await download.path()).toString('latin1', 0, 4), 'RIFF');
+  await page.evaluate(() => { carillonConsole.trace.stop(); carillonConsole.trace.seek(0.3); });
+  await keepPicture(page, 'console_trace.png');
+}));
+
+test('the page of a trace needs no server', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await checkTrace(page);
+}, `file://${process.env.CARILLON_TEST_PAGE}`));
 
 test('thirty bodies of a page of one’s own fall in Rapier, and are heard', { timeout: 400000 }, () => inBrowser(async (page) => {
   await page.waitForFunction(() => globalThis.example);
@@ -447,3 +507,14 @@ test('after the daemon was killed and started again, the page strikes as before'
   await page.waitForFunction(async () => (await carillonConsole.state.services.audio.getMixer({})).activeModeCount > 0);
   assert.equal(await page.locator('.fault').count(), 0);
 }));
+
+test('the console ends well while calls are under way', { timeout: 60000 }, async () => {
+  const socket = new WebSocket(`ws://${address.host}/tunnel`, { headers: { cookie: await cookie(), origin } });
+  await new Promise((resolve) => { socket.on('open', resolve); });
+  const heard = new Promise((resolve) => { socket.once('message', resolve); });
+  for (let call = 0; call < 30; call += 1) for (const kind of [0, 1, 2]) socket.send(frame(kind, call, kind ? '' : '/carillon.v1.AudioService/Listen'));
+  await heard;
+  const closed = new Promise((resolve) => { socket.on('close', resolve); });
+  process.kill(Number(process.env.CARILLON_CONSOLE_PID), 'SIGTERM');
+  await closed;  // test_console.py asks for the status
+});

@@ -58,6 +58,22 @@ class ConsoleTest(DaemonTest):
             shutil.copy(web / name, pages)
         return pages
 
+    def write_trace(self):
+        """Writes a trace of two bars that fly and are struck in turn, and renders it; returns its file and its page."""
+        file, page = self.folder / "flight.contacts", self.folder / "flight.html"
+        trace = carillon.Trace(step=0.1)
+        with carillon.connect(self.daemon.server) as client:
+            bar = client.create_model(self.bar, material="structural_steel")
+        damped = carillon.material("structural_steel", loss_factor=0.02)  # each blow is over before the next
+        handles = [trace.add(bar, damped, label=label) for label in ("left", "right</script>")]
+        for step in range(10):
+            impacts = carillon.Impacts(handles[step % 2], [[0, 0, 0]], [[0, 0, 0.02]])
+            trace.step(step * 0.1, impacts=impacts if step < 6 else None,
+                       poses=carillon.Poses(handles, [[0, 0.1 * step, 0], [0.5, -0.1 * step, 0]]))
+        trace.write(file)
+        self.daemon.command("render", "--tail", "0.5", "--out", self.folder / "flight.wav", "--html", page, file)
+        return file, page
+
     def simulate(self):
         """Strikes three bars in a muted scene, in turn, until the test is done; goes on after the daemon's end."""
         while not self.done.is_set():
@@ -91,7 +107,9 @@ class ConsoleTest(DaemonTest):
             thread.start()
         example = self.start("carillon-console", "--server", self.daemon.server, "--port", "0", "--pages",
                              self.bundle_example())[1]
-        environment = {**os.environ, "NODE_PATH": os.environ["CARILLON_CONSOLE_MODULES"], "CARILLON_CONSOLE": address,
+        trace, page = self.write_trace()
+        environment = {**os.environ, "CARILLON_TEST_TRACE": str(trace), "CARILLON_TEST_PAGE": str(page),
+                       "NODE_PATH": os.environ["CARILLON_CONSOLE_MODULES"], "CARILLON_CONSOLE": address,
                        "CARILLON_EXAMPLE": example.replace("/?", "/pages/?"),
                        "CARILLON_CONSOLE_PID": str(console.pid), "CARILLON_DAEMON_PID": str(self.daemon.process.pid),
                        "CARILLON_TEST_BAR": str(self.bar), "CARILLON_TEST_OPEN": str(opened),

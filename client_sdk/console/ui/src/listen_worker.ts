@@ -7,7 +7,9 @@ import { Tunnel, tunnelAddress } from './tunnel';
 
 export type ListenNews =
   | { kind: 'format'; sampleRateHz: number; channels: number; memory: SharedArrayBuffer }
-  | { kind: 'lost'; frames: number };
+  | { kind: 'lost'; frames: number }
+  /** The mixer's frame that the ring's first frame would have been. */
+  | { kind: 'clock'; origin: number };
 
 const tell = (news: ListenNews) => self.postMessage(news);
 const RETRY_MS = 500;
@@ -15,7 +17,7 @@ const RETRY_MS = 500;
 async function listen(tunnel: Tunnel, scene: string): Promise<void> {
   let ring: Ring | undefined;
   let nextFrame: bigint | undefined;
-  let lost = 0;
+  let lost = 0, origin: number | undefined;
   for await (const { format, block } of clientOf(AudioService, tunnel).listen({ scene })) {
     if (format) {
       ring = new Ring(Ring.allocate(format.channelCount), format.channelCount);
@@ -29,9 +31,12 @@ async function listen(tunnel: Tunnel, scene: string): Promise<void> {
     if (missing > 0) {
       // Silence of the same length keeps the clock.
       ring.write(new Float32Array(Math.min(missing, 4096) * ring.channels));
-      tell({ kind: 'lost', frames: lost += missing });
     }
-    ring.write(samples);
+    const begins = Number(block.firstFrame) - ring.written();
+    if (begins !== origin) tell({ kind: 'clock', origin: origin = begins });
+    // A starved audio thread leaves no place for the newest.
+    const now = lost + Math.max(missing, 0) + ring.write(samples);
+    if (now > lost) tell({ kind: 'lost', frames: lost = now });
     nextFrame = block.firstFrame + BigInt(samples.length / ring.channels);
   }
 }

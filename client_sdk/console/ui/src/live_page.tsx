@@ -3,6 +3,8 @@ import { useEffect, useRef } from 'preact/hooks';
 import { effect } from '@preact/signals';
 import { LiveView, MOST_DOTS } from './live_view';
 import * as live from './live_state';
+import type { SeenBlow } from './live_state';
+import { fetchSurface } from './modal_model';
 import { hear, heardScene } from './sounding';
 import * as state from './state';
 import { SpectrogramView } from './strike_page';
@@ -10,7 +12,7 @@ import { SpectrogramView } from './strike_page';
 function Picture() {
   const canvas = useRef<HTMLCanvasElement>(null);
   useEffect(() => {
-    const view = new LiveView(canvas.current!, state.services);
+    const view = new LiveView(canvas.current!, (name) => fetchSurface(state.services, name));
     let newest: live.SeenBlow | undefined;
     const ends = [
       effect(() => { void view.update(live.scene.value, live.objects.value); }),
@@ -19,6 +21,7 @@ function Picture() {
         for (const blow of live.blows.value.slice(0, Math.min(MOST_DOTS, known < 0 ? MOST_DOTS : known)).reverse()) view.blow(blow);
         [newest] = live.blows.value;
       }),
+      effect(() => { if (live.chosen.value) view.blow({ ...live.chosen.value, seenMs: Date.now() }); }),
     ];
     return () => ends.forEach((end) => end());
   }, []);
@@ -50,11 +53,23 @@ function Findings() {
 
 const size = (impulse?: { x: number; y: number; z: number }) => Math.hypot(impulse?.x ?? 0, impulse?.y ?? 0, impulse?.z ?? 0);
 
+const striker = ({ striker: by }: SeenBlow['blow']) => (by.case === 'otherObject' ? `body ${by.value}` : by.case === 'partner' ? `#${by.value}` : '');
+
+/** The blow that was chosen, and the step that made it. */
+function Origin() {
+  const chosen = live.chosen.value;
+  if (!chosen) return null;
+  const { blow } = chosen, stepS = live.stepTimeOf(chosen), { x, y, z } = blow.pointM ?? { x: 0, y: 0, z: 0 };
+  return <p role="status" class="origin">The blow at {blow.timeS.toFixed(3)} s on body {blow.object}{striker(blow) && ` by ${striker(blow)}`}, point {[x, y, z]
+    .map((metres) => (1000 * metres).toFixed(1)).join(', ')} mm of its frame, {size(blow.impulseNewtonSeconds).toPrecision(2)} N s
+    {stepS !== undefined && `, from the step at about ${stepS.toFixed(3)} s after the first`}</p>;
+}
+
 function Blows() {
-  return <section class="blows"><h2>Newest blows</h2><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
-    <tbody>{live.blows.value.slice(0, 12).map(({ blow }) => <tr>
-      <td>{blow.timeS.toFixed(3)}</td><td>{blow.object}</td>
-      <td>{blow.striker.case === 'otherObject' ? `body ${blow.striker.value}` : blow.striker.case === 'partner' ? `#${blow.striker.value}` : ''}</td>
+  return <section class="blows"><h2>Newest blows</h2><Origin /><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
+    <tbody>{live.blows.value.slice(0, 12).map((seen) => [seen, seen.blow] as const).map(([seen, blow]) => <tr>
+      <td><button class="inline" onClick={() => { live.chosen.value = seen; }}>{blow.timeS.toFixed(3)}</button></td><td>{blow.object}</td>
+      <td>{striker(blow)}</td>
       <td>{size(blow.impulseNewtonSeconds).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
 }
 
@@ -68,7 +83,7 @@ export function LivePage() {
           {scene.name === state.sceneName() ? ' (this page)' : ''}</option>)}</select></label>
         <label class="tick"><input type="checkbox" checked={heard} onChange={(event) => void hear(event.currentTarget.checked ? live.sceneName.value : '')} /> hear this scene alone</label>
       </section>
-      <Picture /><SpectrogramView /></div>
+      <Picture /><SpectrogramView chosen={live.chooseAt} /></div>
     <div class="right" tabIndex={0} role="region" aria-label="Why nothing is heard, findings and blows"><Chain /><Findings /><Blows />
       {state.fault.value && <p class="fault" role="alert">{state.fault.value.message}</p>}</div></main>;
 }

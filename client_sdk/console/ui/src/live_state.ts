@@ -24,9 +24,27 @@ export const sceneName = signal('');
 export const objects = signal<SoundingObject[]>([]);
 export const blows = signal<SeenBlow[]>([]);
 export const streams = signal<Map<bigint, SeenStream>>(new Map());
+/** The blow whose origin is shown. */
+export const chosen = signal<SeenBlow | undefined>(undefined);
 export const lostCount = signal(0n);
 
 export const scene = computed(() => scenes.value.find((one) => one.name === sceneName.value));
+
+/** How far before a place of the spectrogram, whose columns have 85 ms of sound, its blow lies at most. */
+const WINDOW_S = 0.25;
+
+/** Chooses the blow that began to sound last before a time of the mixer. */
+export function chooseAt(timeS: number): void {
+  chosen.value = blows.value.filter(({ blow }) => blow.timeS < timeS + 0.02 && timeS - blow.timeS < WINDOW_S)
+    .sort((a, b) => b.blow.timeS - a.blow.timeS)[0];
+}
+
+/** The time of the step that made a blow, s after the stream's first step; unknown before the stream's first report, and
+ * earlier than it was where the step came late. */
+export function stepTimeOf({ blow, stream }: SeenBlow): number | undefined {
+  const report = streams.value.get(stream)?.report, rate = state.mixer.value?.format?.sampleRateHz;
+  return report?.firstFrame === undefined || !rate ? undefined : blow.timeS - Number(report.firstFrame) / rate - report.schedulingDelayS;
+}
 
 /** A stage between a simulator and an ear. */
 export interface Link {
@@ -182,6 +200,7 @@ effect(() => {
   if (!watching.value || !name || !state.reached.value) return undefined;
   const stop = new AbortController();
   blows.value = [];
+  chosen.value = undefined;
   streams.value = new Map();
   void watch(name, stop.signal);
   return () => stop.abort();

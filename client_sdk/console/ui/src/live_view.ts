@@ -6,15 +6,15 @@ import { DrawBudget } from './draw_budget';
 import type { Scene, SoundingObject } from './gen/carillon/v1/scene_service_pb';
 import type { Pose } from './gen/carillon/v1/contact_pb';
 import type { SeenBlow } from './live_state';
-import { fetchSurface } from './modal_model';
 import type { Surface } from './modal_model';
-import type { Services } from './services';
 
 /** Colours that the colour-blind tell apart (Okabe and Ito). */
-const COLORS = [0x0072b2, 0xe69f00, 0x009e73, 0xcc79a7, 0x56b4e9, 0xd55e00, 0xf0e442, 0x999999];
+export const COLORS = [0x0072b2, 0xe69f00, 0x009e73, 0xcc79a7, 0x56b4e9, 0xd55e00, 0xf0e442, 0x999999];
 const BLOW_MS = 700;
 const GLOW_MS = 250;
 export const MOST_DOTS = 24;
+
+export type SurfaceOf = (modalModel: string) => Promise<Pick<Surface, 'vertices' | 'triangles'>>;
 
 interface Shown {
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
@@ -28,7 +28,7 @@ export class LiveView {
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(40, 1, 1e-3, 1e4);
   private readonly controls: OrbitControls;
-  private readonly surfaces = new Map<string, Promise<Surface>>();
+  private readonly surfaces = new Map<string, ReturnType<SurfaceOf>>();
   private readonly shown = new Map<number, Shown>();
   private readonly dots = new THREE.Group();
   private readonly ball = new THREE.SphereGeometry(1, 12, 8);
@@ -39,7 +39,7 @@ export class LiveView {
   /** Whether a pose, a body or the size has changed since the last picture. */
   private dirty = true;
 
-  constructor(private readonly canvas: HTMLCanvasElement, private readonly services: Services) {
+  constructor(private readonly canvas: HTMLCanvasElement, private readonly surfaceOf: SurfaceOf) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
     this.budget = new DrawBudget(this.renderer);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -72,7 +72,7 @@ export class LiveView {
     this.drawnState = state;
   }
 
-  blow({ blow, seenMs }: SeenBlow): void {
+  blow({ blow, seenMs }: Pick<SeenBlow, 'blow' | 'seenMs'>): void {
     const struck = this.shown.get(blow.object);
     if (!struck || !blow.pointM) return;
     struck.struckMs = performance.now();
@@ -97,7 +97,7 @@ export class LiveView {
   }
 
   private async place(object: SoundingObject): Promise<void> {
-    if (!this.surfaces.has(object.modalModel)) this.surfaces.set(object.modalModel, fetchSurface(this.services, object.modalModel));
+    if (!this.surfaces.has(object.modalModel)) this.surfaces.set(object.modalModel, this.surfaceOf(object.modalModel));
     const name = this.sceneName;
     const surface = await this.surfaces.get(object.modalModel)!.catch(() => undefined);
     if (!surface || name !== this.sceneName) return;

@@ -6,9 +6,11 @@ import { ModelsPage } from './models_page';
 import { hasDevice, player, playerChanged, soundByGesture, sounding, toggleSound } from './sounding';
 import * as state from './state';
 import * as live from './live_state';
+import { TracePage } from './trace_page';
+import * as trace from './trace_state';
 import { audition, StrikePage, view } from './strike_page';
 
-const TABS = { strike: 'Strike', live: 'Live', models: 'Models' } as const;
+const TABS = { strike: 'Strike', live: 'Live', models: 'Models', trace: 'Trace' } as const;
 const tabOf = (hash: string) => (hash.slice(1) in TABS ? hash.slice(1) as keyof typeof TABS : 'strike');
 const tab = signal(tabOf(location.hash));
 addEventListener('hashchange', () => { tab.value = tabOf(location.hash); });
@@ -22,7 +24,7 @@ function Header() {
   return <header><h1>Carillon</h1>
     <nav aria-label="Views">{Object.entries(TABS).map(([name, title]) => <a href={`#${name}`} aria-current={tab.value === name ? 'page' : undefined}>{title}</a>)}</nav>
     <span>{mixer ? `${mixer.device}, load ${(100 * mixer.load).toFixed(1)} %, ${mixer.activeModeCount} modes ring, ${level}` : 'no daemon'}</span>
-    <span>{sounding.value && player.underruns ? `${player.underruns} gaps in the sound` : ''}</span>
+    <span>{sounding.value && player.underruns ? `${player.underruns} gaps` : ''}</span>
     <label class="volume">Volume here <input type="range" min="0" max="60" step="1" value={player.volumeDb}
       onInput={(event) => { player.volumeDb = Number(event.currentTarget.value); }} /></label>
     <button aria-pressed={sounding.value} title={hasDevice() ? 'The daemon sounds on its own device' : ''} onClick={() => void toggleSound()}>
@@ -32,8 +34,8 @@ function Header() {
 function Page() {
   // The body stays in its view while others are looked at.
   return <><Header /><div class="page" hidden={tab.value !== 'strike'}><StrikePage /></div>
-    {tab.value === 'live' && <LivePage />}{tab.value === 'models' && <ModelsPage audition={(model) => void audition(model)} />}</>;
+    {tab.value === 'live' && <LivePage />}{tab.value === 'trace' && <TracePage />}{tab.value === 'models' && <ModelsPage audition={(model) => void audition(model)} />}</>;
 }
 
 render(<Page />, document.body);
-Object.assign(globalThis, { carillonConsole: { player, state, live, view: () => view } });
+Object.assign(globalThis, { carillonConsole: { player, state, live, trace, view: () => view } });

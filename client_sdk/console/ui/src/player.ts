@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { ListenNews } from './listen_worker';
+import { Ring } from './ring';
 
 /** Plays the daemon's sound, or that of one scene, in the browser. */
 export class Player {
@@ -12,6 +13,8 @@ export class Player {
   lostFrames = 0;
   /** Gets what the audio thread plays, once it is told { tap: true }; for tests and for pages that record. */
   onSamples: (samples: Float32Array, frame: number) => void = () => {};
+  private ring?: Ring;
+  private origin?: number;
   private worker?: Worker;
   private volume?: GainNode;
   private gainDb = 24;
@@ -29,6 +32,7 @@ export class Player {
     const ready = new Promise<void>((resolve) => { this.playing = resolve; });
     worker.onmessage = async ({ data }: MessageEvent<ListenNews>) => {
       if (data.kind === 'lost') this.lostFrames = data.frames;
+      else if (data.kind === 'clock') this.origin = data.origin;
       else await this.play(data);
       this.changed();
     };
@@ -36,9 +40,15 @@ export class Player {
     return ready;
   }
 
+  /** The time of the mixer's frame that the audio thread plays now, s, as blows have it. */
+  playedS(): number | undefined {
+    if (!this.context || !this.ring || this.origin === undefined) return undefined;
+    return (this.origin + this.ring.read()) / this.context.sampleRate;
+  }
+
   async stop(): Promise<void> {
     const { worker, context } = this;
-    this.context = this.analyser = this.node = this.worker = undefined;
+    this.context = this.analyser = this.node = this.worker = this.ring = this.origin = undefined;
     worker?.terminate();
     await context?.close();
     this.changed();
@@ -63,6 +73,7 @@ export class Player {
       if (this.context !== context) return;
       this.connect(context, format.channels);
     }
+    this.ring = new Ring(format.memory, format.channels);
     this.node!.port.postMessage({ memory: format.memory, channels: format.channels });
     await this.context!.resume();
   }

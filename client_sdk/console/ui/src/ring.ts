@@ -23,14 +23,19 @@ export class Ring {
     return (Atomics.load(this.places, HEAD) - Atomics.load(this.places, TAIL)) | 0;
   }
 
-  /** Writes whole frames, and drops those for which there is no place. */
-  write(samples: Float32Array): void {
+  /** The numbers of all frames written and read, modulo 2^32. */
+  written(): number { return Atomics.load(this.places, HEAD) >>> 0; }
+  read(): number { return Atomics.load(this.places, TAIL) >>> 0; }
+
+  /** Writes whole frames, and drops those for which there is no place; returns their number. */
+  write(samples: Float32Array): number {
     const head = Atomics.load(this.places, HEAD);
     const frames = Math.min(samples.length / this.channels, RING_FRAMES - this.fill());
     for (let i = 0; i < frames * this.channels; i += 1) {
       this.samples[((head & (RING_FRAMES - 1)) * this.channels + i) % this.samples.length] = samples[i]!;
     }
     Atomics.store(this.places, HEAD, (head + frames) | 0);
+    return samples.length / this.channels - frames;
   }
 
   /** The sample `frame` frames after the tail. */

@@ -70,9 +70,11 @@ export function modeAt(canvas: HTMLCanvasElement, modes: SoundingMode[], place: 
 export class Spectrogram {
   private readonly pen: CanvasRenderingContext2D;
   private ended = false;
+  /** The time of each column, as playedS has it, the newest last. */
+  private readonly times: (number | undefined)[] = [];
   private readonly levels: Uint8Array<ArrayBuffer>;
 
-  constructor(private readonly canvas: HTMLCanvasElement, readonly analyser: AnalyserNode) {
+  constructor(private readonly canvas: HTMLCanvasElement, readonly analyser: AnalyserNode, private readonly playedS: () => number | undefined) {
     this.pen = canvas.getContext('2d', { willReadFrequently: true })!;
     this.levels = new Uint8Array(analyser.frequencyBinCount);
     this.canvas.width = 600;
@@ -89,8 +91,15 @@ export class Spectrogram {
     this.ended = true;
   }
 
+  /** The time of the sound at a place of the canvas, as a share of its width. */
+  timeAt(share: number): number | undefined {
+    return this.times[Math.floor(share * this.canvas.width) - this.canvas.width + this.times.length];
+  }
+
   private advance(): void {
     const { width, height } = this.canvas;
+    this.times.push(this.playedS());
+    if (this.times.length > width) this.times.shift();
     this.analyser.getByteFrequencyData(this.levels);
     this.pen.drawImage(this.canvas, -1, 0);
     const column = this.pen.createImageData(1, height);

@@ -227,19 +227,24 @@ function News() {
   </div>;
 }
 
-export function SpectrogramView() {
+/** `chosen` gets the time, s of the mixer, of a place that is clicked. */
+export function SpectrogramView({ chosen }: { chosen?: (timeS: number) => void }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const drawn = useRef<Spectrogram>();
   playerChanged.value;
   useEffect(() => {
     if (!player.analyser || drawn.current?.analyser === player.analyser) return;
     drawn.current?.end();
-    drawn.current = new Spectrogram(canvas.current!, player.analyser);
+    drawn.current = new Spectrogram(canvas.current!, player.analyser, () => player.playedS());
   });
   useEffect(() => () => drawn.current?.end(), []);
-  return <figure><figcaption>What is heard here, to 16 kHz{sounding.value ? '' : ': nothing, '}
+  const choose = (event: MouseEvent) => {
+    const time = drawn.current?.timeAt(event.offsetX / canvas.current!.clientWidth);
+    if (time !== undefined) chosen?.(time);
+  };
+  return <figure><figcaption>What is heard here, to 16 kHz{chosen && '; click a sound to see the blow that made it'}{sounding.value ? '' : ': nothing, '}
     {!sounding.value && <button class="inline" onClick={() => sound('')}>hear the daemon in this browser</button>}</figcaption>
-    <canvas ref={canvas} class="spectrogram" aria-hidden="true" /></figure>;
+    <canvas ref={canvas} class="spectrogram" onClick={choose} aria-hidden="true" /></figure>;
 }
 
 export function StrikePage() {

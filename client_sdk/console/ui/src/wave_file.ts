@@ -39,9 +39,13 @@ export async function saveStrike(): Promise<void> {
     if (response.case === 'format') ({ sampleRateHz: rate, channelCount: channels } = response.value);
     if (response.case === 'block') blocks.push(response.value.samples);
   }
+  saveAs(waveFile(blocks, rate, channels), 'strike.wav');
+}
+
+export function saveAs(file: Blob, name: string): void {
   const link = document.createElement('a');
-  link.href = URL.createObjectURL(waveFile(blocks, rate, channels));
-  link.download = 'strike.wav';
+  link.href = URL.createObjectURL(file);
+  link.download = name;
   link.click();
   // The browser reads the address after this function has ended.
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
