@@ -5,8 +5,8 @@
 #
 # Makes the Debian packages from the programs in BUILD, by default build/release, builds deploy/container/Containerfile
 # with them on a bare Debian 12, and runs tests/deploy/use_container.sh in the container. Needs root, and the packages
-# of deploy/packages/packages.txt. Leaves nothing behind. Ends with 77, which ctest takes for a skipped test, where the
-# caller is not root.
+# of deploy/packages/{packages,bare}.txt. Leaves nothing behind. Ends with 77, which ctest takes for a
+# skipped test, where the caller is not root.
 set -euo pipefail
 if [[ $(id -u) != 0 ]]; then
   printf 'bare_container: only root can make a bare Debian\n' >&2

@@ -6,8 +6,8 @@
 # Makes the Debian packages twice from the programs in BUILD, by default build/release: as the version before and as
 # this one. tests/deploy/installed_links.py finds the dead links in their pages. tests/deploy/use_packages.sh then
 # installs, upgrades, uses, removes and purges them in a bare Debian 12.
-# Needs what deploy/bare_debian.sh needs, and the packages of deploy/packages/packages.txt. Ends with 77, which ctest
-# takes for a skipped test, where the caller is not root.
+# Needs what deploy/bare_debian.sh needs, and the packages of deploy/packages/{packages,bare}.txt. Ends with 77, which
+# ctest takes for a skipped test, where the caller is not root.
 set -euo pipefail
 if [[ $(id -u) != 0 ]]; then
   printf 'bare_packages: only root can make a bare Debian\n' >&2

@@ -4,10 +4,10 @@
 # deploy/package.sh [--version VERSION] [--built BUILD] [FOLDER]
 #
 # Builds the release preset and makes Debian packages of it in FOLDER, by default build/packages, which apt can use as
-# a repository, with the archive of the source that belongs to them. VERSION is that of CMakeLists.txt unless it is
-# given. The add-on for Blender comes as a zip, too. lintian checks the packages of the project's own version, and its
-# errors fail the script. With --built, the programs are taken from the folder BUILD as they are, and no package is
-# installed for building them.
+# a repository, with the archive of the source that belongs to them. The add-on for Blender comes as a zip, too, and the
+# client for Python as a wheel for every system. VERSION is that of CMakeLists.txt unless it is given. lintian checks
+# the packages of the project's own version, and its errors fail the script. With --built, the programs are taken from
+# the folder BUILD as they are, and no package is installed for building them.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # shellcheck source=deploy/environment.sh
@@ -60,8 +60,13 @@ dpkg-buildpackage --build=binary --no-sign --no-check-builddeps >"$scratch/log" 
 cp "$scratch"/*.deb "$folder"
 cp -r "$source/client_sdk/blender" "$scratch/carillon_blender"
 (cd "$scratch" && python3 -m zipfile -c "$folder/carillon_blender-$version.zip" carillon_blender)
-# The index lets apt use the folder as a repository.
-(cd "$folder" && dpkg-scanpackages --multiversion . >Packages 2>/dev/null)
+(cd "$source/client_sdk/python" && /usr/bin/python3 setup.py --quiet bdist_wheel --dist-dir "$folder" >/dev/null)
+# The indexes let apt use the folder as a repository.
+cd "$folder"
+rm -f Release
+apt-ftparchive packages . >Packages
+apt-ftparchive release . >"$scratch/Release"
+cp "$scratch/Release" .
 printf 'package: %s\n' "$folder"/*_"$version"_*.deb "$folder/carillon_$version.tar.xz" \
-  "$folder/carillon_blender-$version.zip"
+  "$folder/carillon_blender-$version.zip" "$folder"/carillon-*.whl
 printf 'apt: echo "deb [trusted=yes] file:%s ./" > /etc/apt/sources.list.d/carillon.list\n' "$folder"

@@ -4,8 +4,8 @@
 # deploy/setup.sh LIST...
 #
 # Installs what is missing of the packages in the given lists, from Debian as this machine's apt is set up. A list is
-# one of deploy/packages/ (programs, console, engines, videos, tests, languages, packages, lint, fuzz, client) or a
-# file. From the npm registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node
+# one of deploy/packages/ (programs, console, engines, videos, tests, languages, packages, bare, lint, fuzz, client) or
+# a file. From the npm registry `lint` also installs buf, `tests`, `packages` and `engines` what the client for Node
 # needs, `tests` and `engines` the engines that run in Node, and `tests`, `packages` and `console` what builds the
 # console's pages.
 # Calls neither registry when nothing is missing.

@@ -50,7 +50,7 @@ selection=()
 # Packages are made and tried in a bare Debian or a container only when their test is named: that takes minutes, and
 # the network.
 if [[ " ${rooms[*]} " =~ " deploy/bare_"(packages|container|client)" " ]]; then
-  lists+=(packages)
+  lists+=(packages bare)
 else
   excluded="${excluded:+$excluded|}packages"
 fi

@@ -7,6 +7,7 @@ set -euo pipefail
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8
 export CARILLON_SERVER=unix:/run/carillon/carillond.sock
 settings=/etc/carillon/carillond.toml
+packages=(carillond carillon-precompute carillon carillon-console libcarillon-dev node-carillon python3-carillon)
 daemon=
 
 fail() {
@@ -18,6 +19,14 @@ fail() {
 run_apt() { apt-get -q -y -o Dpkg::Use-Pty=0 -o Acquire::Retries=3 "$@" >apt.log 2>&1 || fail "$(cat apt.log)"; }
 
 install_packages() { run_apt install --no-install-recommends "$@"; }
+
+# By the line that deploy/package.sh prints. Blender itself is left out, because it is large.
+install_from_repository() {
+  echo "deb [trusted=yes] file:$PWD/$1 ./" >/etc/apt/sources.list.d/carillon.list
+  run_apt update
+  install_packages "${packages[@]}"
+  run_apt install --simulate blender-carillon
+}
 
 setting() { sed -n "s/^$1=//p" /lib/systemd/system/carillond.service; }
 
@@ -54,8 +63,7 @@ hear_a_strike() {
   (($(tail -c +100 heard.wav | tr -d '\0' | wc -c) > 50000)) || fail "the strike is not in heard.wav"
 }
 
-run_apt update
-install_packages ./before/*.deb
+install_from_repository before
 getent passwd carillon >/dev/null || fail "there is no user carillon"
 start_daemon
 carillon example bar
@@ -64,7 +72,7 @@ stop_daemon
 
 # A setting of the administrator survives the upgrade, and so do the models.
 echo 'sample_rate = 44100' >>"$settings"
-install_packages ./now/*.deb
+install_from_repository now
 [[ $(dpkg-query -W -f '${Version}' carillond) == "$(cd now && echo carillond_*.deb | cut -d _ -f 2)" ]] ||
   fail "the upgrade left the version before"
 grep -q '^sample_rate = 44100$' "$settings" || fail "the upgrade replaced $settings"
@@ -83,6 +91,13 @@ for page in ten_minutes_{python,cpp,c,node,any_language}.md; do
   (cd "pages/$page" && env -u CARILLON_SERVER ../../type_page.py "/usr/share/doc/carillon/docs/$page" ../../now) ||
     fail "$page does not work as printed"
 done
+wheel=$(echo "$PWD"/now/carillon-*-py3-none-any.whl)
+PYTHONPATH=$wheel python3 -c "
+import carillon
+assert carillon.__file__.startswith('$wheel'), carillon.__file__
+with carillon.connect() as c:
+    assert c.model('again').render_strike((0.1, 0.015, 0.008), (0, 0, -0.01)).peak > 1e-4" ||
+  fail "the wheel is not whole"
 stop_daemon
 
 for document in carillon-precompute/{copyright,SOURCE} carillond/copyright carillon/README.md; do
@@ -90,7 +105,6 @@ for document in carillon-precompute/{copyright,SOURCE} carillond/copyright caril
 done
 grep -q 'AFFERO' /usr/share/doc/carillon-precompute/copyright || fail "the AGPL is missing"
 
-packages=(carillond carillon-precompute carillon carillon-console libcarillon-dev node-carillon python3-carillon)
 run_apt remove "${packages[@]}"
 [[ ! -e /usr/bin/carillond && ! -e /lib/systemd/system/carillond.service ]] || fail "remove left programs"
 [[ -e $settings && -e /var/lib/carillon/carillon.db ]] || fail "remove deleted settings or models"
