@@ -36,6 +36,8 @@ INSTALLED = {
     # The adapters include each other by their places in the source.
     "client_sdk/adapters": "libcarillon-dev /usr/share/doc/libcarillon-dev/examples/client_sdk/adapters",
     "client_sdk/examples/strike/main.cc": "libcarillon-dev /usr/share/doc/libcarillon-dev/examples/strike.cc",
+    "client_sdk/console/ui/web/README.md": "carillon-console /usr/share/doc/carillon-console/WEB.md",
+    "client_sdk/examples/browser": "carillon-console /usr/share/doc/carillon-console/examples/browser",
     "client_sdk/node/README.md": "node-carillon /usr/share/doc/node-carillon/README.md",
     "client_sdk/python/README.md": "python3-carillon /usr/share/doc/python3-carillon/README.md",
     "client_sdk/python/strike.py": "python3-carillon /usr/share/doc/python3-carillon/examples/strike.py",
