@@ -174,9 +174,9 @@ absl::Status CheckComplete(const v1::Material& material) {
   if (!material.has_density_kg_per_m3()) missing.emplace_back("--density");
   if (missing.empty()) return absl::OkStatus();
   constexpr size_t kAll = 3;
-  return InvalidOption(absl::StrCat(
-      missing.size() == kAll ? "no material" : "the material is not complete", ": give ",
-      absl::StrJoin(missing, ", "), ", or --material NAME"));
+  return InvalidOption(
+      absl::StrCat(missing.size() == kAll ? "no material" : "the material is not complete",
+                   ": give ", absl::StrJoin(missing, ", "), ", or --material NAME"));
 }
 
 /// A field of a material, and the option that sets it.
