@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,14 +19,23 @@ namespace {
 
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
+#ifdef CARILLON_MUJOCO
+/// MuJoCo leaves the poses from before its step. Gives those after it, as the other engines do.
+falls::Simulation FallInMujocoWithPosesAfter(const falls::FallScene& scene, double step_s) {
+  const falls::Simulation simulation = falls::FallInMujoco(scene, step_s).value();
+  const auto next = std::make_shared<v1::ContactStep>(simulation());
+  return [simulation, next] {
+    v1::ContactStep step = std::exchange(*next, simulation());
+    *step.mutable_poses() = next->poses();
+    return step;
+  };
+}
+#endif
+
 Engine EngineOf(const std::string& name) {
   if (name == "ode") return falls::FallInOde;
 #ifdef CARILLON_MUJOCO
-  if (name == "mujoco") {
-    return [](const falls::FallScene& scene, double step_s) {
-      return falls::FallInMujoco(scene, step_s).value();
-    };
-  }
+  if (name == "mujoco") return FallInMujocoWithPosesAfter;
 #endif
   return falls::FallInBullet;
 }
