@@ -40,7 +40,7 @@ class JoltContacts {
   addObject(body, handle) {
     const key = keyOf(body);
     this.contactRows.addObject(key, handle);
-    this.bodies.set(key, { body, before: this.describe(body) });
+    this.bodies.set(key, { body, before: this.describe(body), poseBefore: poseOf(body) });
   }
 
   /** Lets a Body sound no more. Call it before BodyInterface.DestroyBody. */
@@ -69,7 +69,7 @@ class JoltContacts {
 
   /**
    * Returns what a step of a stream or trace takes. Call it after each JoltInterface.Step(stepS, 1), whose collisions
-   * are one step.
+   * are one step. The poses are those from before the step, to which Jolt's points belong.
    */
   read(stepS) {
     const gravity = vector(this.system.GetGravity());
@@ -79,8 +79,12 @@ class JoltContacts {
       { ...touch, first: now.get(first.key) ?? first, second: now.get(second.key) ?? second }));
     this.touches = [];
     const rows = balanced(contacts).flatMap((contact) => this.contactRows.rows(contact));
-    for (const object of this.bodies.values()) object.before = this.describe(object.body);
-    return { contacts: rows, poses: this.contactRows.poses((key) => poseOf(this.bodies.get(key).body)) };
+    const poses = this.contactRows.poses((key) => this.bodies.get(key).poseBefore);
+    for (const object of this.bodies.values()) {
+      object.before = this.describe(object.body);
+      object.poseBefore = poseOf(object.body);
+    }
+    return { contacts: rows, poses };
   }
 
   describe(body) {

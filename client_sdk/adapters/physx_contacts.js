@@ -19,6 +19,7 @@ class PhysxContacts {
     this.contactRows = new ContactRows(rest);
     this.bodies = new Map();
     this.before = new Map(); // Bodies as they were after the step before.
+    this.posesBefore = new Map();
     this.touches = [];
     this.buffer = new physx.PxArray_PxContactPairPoint(64);
     this.callback = new physx.PxSimulationEventCallbackImpl();
@@ -41,6 +42,7 @@ class PhysxContacts {
     this.contactRows.addObject(key, handle);
     this.bodies.set(key, body);
     this.before.set(key, describe(body, key));
+    this.posesBefore.set(key, poseOf(body));
   }
 
   /** Lets a body sound no more. Call it before the body's release(). */
@@ -49,6 +51,7 @@ class PhysxContacts {
     this.contactRows.removeObject(key);
     this.bodies.delete(key);
     this.before.delete(key);
+    this.posesBefore.delete(key);
   }
 
   keyOf(actor) {
@@ -75,7 +78,7 @@ class PhysxContacts {
 
   /**
    * Returns what a step of a stream or trace takes. Call it after fetchResults(true) of a simulate(stepS). `gravity` is
-   * the scene's, as an array.
+   * the scene's, as an array. The poses are those from before the step, to which PhysX's points belong.
    */
   read(stepS, gravity) {
     const now = new Map();
@@ -87,8 +90,10 @@ class PhysxContacts {
     this.touches = [];
     const rows = withFriction(contacts, this.before, gravity, stepS)
       .flatMap((contact) => this.contactRows.rows(contact));
+    const poses = this.contactRows.poses((key) => this.posesBefore.get(key));
     this.before = now;
-    return { contacts: rows, poses: this.contactRows.poses((key) => poseOf(this.bodies.get(key))) };
+    for (const [key, body] of this.bodies) this.posesBefore.set(key, poseOf(body));
+    return { contacts: rows, poses };
   }
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""One fall in five engines at three rates of steps: how loud it comes out, as a table.
+"""One fall in five engines, or ten, at three rates of steps: how loud it comes out, as a table.
 
 Each number is a level relative to the median of all engines and rates of its scene: of a fall and of a collision the
 energy of the first blow, of a roll and of a slide the mean power. Beside it stand, where they belong: the greatest
@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import statistics
+import subprocess
 import sys
 import tempfile
 
@@ -21,12 +22,16 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 RATES_HZ = (60, 240, 1000)
 SAMPLE_RATE_HZ = 48000
 # Scene: simulated seconds, and the window of what travels.
-SECONDS = {"corner": 3.0, "collision": 1.0, "roll": 1.2, "slide": 2.0}
+SECONDS = {"flat": 2.0, "tilted": 2.0, "corner": 3.0, "collision": 1.0, "roll": 1.2, "slide": 2.0}
 TRAVELS_S = {"roll": (0.2, 1.1), "slide": (0.15, 0.85)}
 BLOW_S = 0.06
 GAIN = 0.001  # no limiter shall make levels alike
-LIMITS_DB = {"corner": 3, "collision": 3, "roll": 4, "slide": 4}
+LIMITS_DB = {"flat": 3, "tilted": 3, "corner": 3, "collision": 3, "roll": 4, "slide": 4}
 REST_DB, LINES_DB = -100, 3
+# The box of tests/client_sdk/adapters/drops.js, which falls in further engines for JavaScript, too.
+DROPS = {"flat": (1, 0, 0, 0), "tilted": (0.84419, 0.3485584, -0.4056972, -0.03549596)}
+DROP_ENGINES = {"rapier": "rapier", "havok": "havok", "cannon-es": "cannon", "Jolt": "jolt", "mujoco-js": "mujoco",
+                "PhysX": "physx", "DART": "dart"}
 
 
 def decibels(ratio):
@@ -50,7 +55,7 @@ def measure(name, samples, rate_hz):
         travels = between(samples, *TRAVELS_S[name])
         return {"level_db": decibels(numpy.mean(numpy.square(travels))), "lines_db": sound.lines_db(travels, rate_hz)}
     measured = {"level_db": decibels(blow_energy(samples))}
-    if name == "corner":
+    if name == "corner" or name in DROPS:
         rest = numpy.abs(between(samples, SECONDS[name] - 0.4, SECONDS[name])).max()
         measured["rest_db"] = 2 * decibels(rest / numpy.abs(samples).max())
     return measured
@@ -68,6 +73,48 @@ def cell(name, measured):
     if "lines_db" in measured:
         text += f" (lines {measured['lines_db']:+.1f})"
     return text if is_right(name, measured) else f"**{text}**"
+
+
+def drop_scene(name):
+    sides, mass = (0.2, 0.14, 0.06), 1.21
+    import falls
+    return {"friction": 0.5, "restitution": 0, "bodies": [
+        {"name": "floor", "shape": {"plane": {}}},
+        {"name": "box", "shape": {"boxes": [{"sides_m": sides}]}, "mass_kg": mass,
+         "inertia_kg_m2": falls.box_inertia(mass, sides), "position_m": (0, 0, 0.3), "velocity_m_per_s": (0.5, 0, 0),
+         "orientation": DROPS[name], "material": "concrete", "wall_m": 0.006, "max_frequency_hz": 8000}]}
+
+
+def scene_of(name):
+    import falls
+    return drop_scene(name) if name in DROPS else json.loads((falls.SCENES / f"{name}.json").read_text())
+
+
+def engines_of(name):
+    import falls
+    return dict.fromkeys((*falls.ENGINES, *DROP_ENGINES)) if name in DROPS else falls.ENGINES
+
+
+def record(name, engine, scene, trace, rate, build):
+    import falls
+    if name not in DROPS or engine in falls.ENGINES and engine not in falls.IN_NODE:
+        return falls.record(engine, scene, trace, rate=rate, seconds=SECONDS[name], build=build)
+    if engine == "DART":
+        return drop_in_dart(scene["bodies"][1]["model"], trace, rate, name)
+    return subprocess.run(["node", pathlib.Path(__file__).with_name("drop.js"), DROP_ENGINES[engine],
+                           *map(str, (rate, SECONDS[name], scene["bodies"][1]["model"], trace, *DROPS[name]))],
+                          check=True, env=falls.node_environment(trace.parent))
+
+
+def drop_in_dart(model, path, rate, name):
+    import carillon
+    from dart_drop import HEIGHT_M, DartDrop
+    drop = DartDrop(1 / rate, DROPS[name])
+    trace = carillon.Trace(1 / rate, frame="scene", simulator="DART")
+    trace.add(model, handle=1, pose=((0, 0, HEIGHT_M), DROPS[name]))
+    for step in range(1, round(SECONDS[name] * rate) + 1):
+        trace.step(step / rate, **drop.step())
+    trace.write(path)
 
 
 def render(client, path):
@@ -105,7 +152,7 @@ def main():
     options = parser.parse_args()
     build = options.build.resolve()
     sys.path[:0] = map(str, (build / "client_sdk/python", ROOT / "client_sdk/python", ROOT / "tests/integration",
-                             ROOT / "client_sdk/examples/falls"))
+                             ROOT / "client_sdk/examples/falls", ROOT / "tests/client_sdk/adapters"))
     os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
     # They need the paths above.
     import carillon
@@ -119,12 +166,12 @@ def main():
         try:
             with carillon.connect(daemon.server) as client:
                 for scene_name in options.scenes:
-                    scene = falls.create_models(client, json.loads((falls.SCENES / f"{scene_name}.json").read_text()))
+                    scene = falls.create_models(client, scene_of(scene_name))
                     table = {}
-                    for engine in options.engines or falls.ENGINES:
+                    for engine in options.engines or engines_of(scene_name):
                         for rate in options.rates:
                             trace = folder / f"{scene_name}-{engine}-{rate}.contacts"
-                            falls.record(engine, scene, trace, rate=rate, seconds=SECONDS[scene_name], build=build)
+                            record(scene_name, engine, scene, trace, rate, build)
                             sound = render(client, trace)
                             if options.keep:
                                 sound.save(trace.with_suffix(".wav"))

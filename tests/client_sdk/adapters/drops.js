@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-// The same box of 2 kg falls on a floor in each engine for JavaScript, and slides. Each of `engines` starts a fall with
-// steps of a length, which has step(), what a step of a stream or trace takes, and momentum(), of the box.
+// The same box falls on a floor in each engine for JavaScript, and slides. Each of `engines` starts a fall with
+// steps of a length and an orientation of the box, [w, x, y, z]. A fall has step(), what a step of a stream or trace
+// takes, and momentum(), of the box.
 const fs = require('node:fs');
 const path = require('node:path');
 const { pathToFileURL } = require('node:url');
 
 const adapters = path.resolve(__dirname, '../../../client_sdk/adapters');
-const MASS_KG = 2;
+const MASS_KG = 1.21; // of hollow concrete with a wall of 6 mm
 const HALF_M = [0.1, 0.07, 0.03];
 const FLOOR_HALF_M = [5, 5, 0.5];
 const FLOOR_AT_M = [0, 0, -0.5];
@@ -16,12 +17,13 @@ const HEIGHT_M = 0.3; // of the middle
 const SPEED_M_PER_S = [0.5, 0, 0];
 const GRAVITY_M_PER_S2 = 9.81;
 const FRICTION = 0.5;
+const FLAT = [1, 0, 0, 0];
 
 const adapter = (name, type) => require(path.join(adapters, name))[type];
 const imported = async (name) => (await import(pathToFileURL(require.resolve(name)))).default;
 const momentum = ({ x, y, z }) => [x, y, z].map((speed) => MASS_KG * speed);
 
-async function rapier(stepS) {
+async function rapier(stepS, [w, x, y, z] = FLAT) {
   const engine = require('@dimforge/rapier3d-compat');
   await engine.init();
   const world = new engine.World({ x: 0, y: 0, z: -GRAVITY_M_PER_S2 });
@@ -29,7 +31,7 @@ async function rapier(stepS) {
   world.lengthUnit = 0.1;
   world.createCollider(engine.ColliderDesc.cuboid(...FLOOR_HALF_M).setTranslation(...FLOOR_AT_M).setFriction(FRICTION));
   const body = world.createRigidBody(engine.RigidBodyDesc.dynamic().setTranslation(0, 0, HEIGHT_M)
-    .setLinvel(...SPEED_M_PER_S).setCanSleep(false));
+    .setRotation({ w, x, y, z }).setLinvel(...SPEED_M_PER_S).setCanSleep(false));
   world.createCollider(engine.ColliderDesc.cuboid(...HALF_M).setMass(MASS_KG).setFriction(FRICTION), body);
   const contacts = new (adapter('rapier_contacts', 'RapierContacts'))();
   contacts.addObject(body, 1);
@@ -40,30 +42,35 @@ async function rapier(stepS) {
   return { step, momentum: () => momentum(body.linvel()), remove: () => world.removeRigidBody(body) };
 }
 
-async function havok(stepS) {
+async function havok(stepS, [w, x, y, z] = FLAT) {
   const wasmBinary = fs.readFileSync(require.resolve('@babylonjs/havok/lib/umd/HavokPhysics.wasm'));
   const engine = await require('@babylonjs/havok')({ wasmBinary });
   const Contacts = adapter('havok_contacts', 'HavokContacts');
   const [, world] = engine.HP_World_Create();
   const gravity = [0, 0, -GRAVITY_M_PER_S2];
   engine.HP_World_SetGravity(world, gravity);
-  const add = (motion, half, position) => {
-    const [, shape] = engine.HP_Shape_CreateBox([0, 0, 0], [0, 0, 0, 1], half.map((x) => 2 * x));
+  const add = (motion, half, position, turn) => {
+    const corners = [-1, 1].flatMap((a) => [-1, 1].flatMap((b) => [-1, 1].flatMap((c) =>
+      [a * half[0], b * half[1], c * half[2]])));
+    const address = engine._malloc(4 * corners.length);
+    engine.HEAPF32.set(corners, address / 4);
+    const [, shape] = engine.HP_Shape_CreateConvexHull(address, corners.length / 3);
+    engine._free(address);
     const [, body] = engine.HP_Body_Create();
     engine.HP_Shape_SetMaterial(shape, [FRICTION, FRICTION, 0, engine.MaterialCombine.MAXIMUM,
       engine.MaterialCombine.MAXIMUM]);
     engine.HP_Body_SetShape(body, shape);
     engine.HP_Body_SetMotionType(body, motion);
-    engine.HP_Body_SetQTransform(body, [position, [0, 0, 0, 1]]);
-    engine.HP_Body_SetMassProperties(body, [[0, 0, 0], MASS_KG, [0.004, 0.007, 0.01], [0, 0, 0, 1]]);
+    engine.HP_Body_SetQTransform(body, [position, turn]);
+    engine.HP_Body_SetMassProperties(body, [[0, 0, 0], MASS_KG, [0.00234, 0.0044, 0.00601], [0, 0, 0, 1]]);
     engine.HP_Body_SetEventMask(body, Contacts.eventMask(engine));
     engine.HP_Body_SetLinearDamping(body, 0);
     engine.HP_Body_SetActivationControl(body, engine.ActivationControl.ALWAYS_ACTIVE);
     engine.HP_World_AddBody(world, body, false);
     return body;
   };
-  add(engine.MotionType.STATIC, FLOOR_HALF_M, FLOOR_AT_M);
-  const body = add(engine.MotionType.DYNAMIC, HALF_M, [0, 0, HEIGHT_M]);
+  add(engine.MotionType.STATIC, FLOOR_HALF_M, FLOOR_AT_M, [0, 0, 0, 1]);
+  const body = add(engine.MotionType.DYNAMIC, HALF_M, [0, 0, HEIGHT_M], [x, y, z, w]);
   engine.HP_Body_SetLinearVelocity(body, SPEED_M_PER_S);
   const contacts = new Contacts(engine, { gravity, friction: FRICTION });
   contacts.addObject(body, 1);
@@ -79,7 +86,7 @@ async function havok(stepS) {
   return { step, remove, momentum: () => engine.HP_Body_GetLinearVelocity(body)[1].map((speed) => MASS_KG * speed) };
 }
 
-async function cannon(stepS) {
+async function cannon(stepS, [w, x, y, z] = FLAT) {
   const engine = require('cannon-es');
   const world = new engine.World({ gravity: new engine.Vec3(0, 0, -GRAVITY_M_PER_S2) });
   Object.assign(world.defaultContactMaterial, { friction: FRICTION, restitution: 0 });
@@ -91,6 +98,7 @@ async function cannon(stepS) {
   };
   add(FLOOR_HALF_M, FLOOR_AT_M, 0);
   const body = add(HALF_M, [0, 0, HEIGHT_M], MASS_KG);
+  body.quaternion.set(x, y, z, w);
   body.velocity.set(...SPEED_M_PER_S);
   const contacts = new (adapter('cannon_contacts', 'CannonContacts'))();
   contacts.addObject(body, 1);
@@ -101,7 +109,7 @@ async function cannon(stepS) {
   return { step, momentum: () => momentum(body.velocity), remove: () => world.removeBody(body) };
 }
 
-async function jolt(stepS) {
+async function jolt(stepS, [w, x, y, z] = FLAT) {
   const engine = await (await imported('jolt-physics'))();
   const settings = new engine.JoltSettings();
   settings.mMaxWorkerThreads = 0;
@@ -116,9 +124,9 @@ async function jolt(stepS) {
   const system = world.GetPhysicsSystem();
   const bodies = system.GetBodyInterface();
   system.SetGravity(new engine.Vec3(0, 0, -GRAVITY_M_PER_S2));
-  const add = (half, at, motion, layer) => {
+  const add = (half, at, turn, motion, layer) => {
     const creation = new engine.BodyCreationSettings(new engine.BoxShape(new engine.Vec3(...half), 0.001),
-      new engine.RVec3(...at), new engine.Quat(0, 0, 0, 1), motion, layer);
+      new engine.RVec3(...at), new engine.Quat(...turn), motion, layer);
     Object.assign(creation, { mAllowSleeping: false, mFriction: FRICTION, mLinearDamping: 0, mAngularDamping: 0 });
     creation.mOverrideMassProperties = engine.EOverrideMassProperties_CalculateInertia;
     creation.mMassPropertiesOverride.mMass = MASS_KG;
@@ -126,8 +134,8 @@ async function jolt(stepS) {
     bodies.AddBody(body.GetID(), engine.EActivation_Activate);
     return body;
   };
-  add(FLOOR_HALF_M, FLOOR_AT_M, engine.EMotionType_Static, 0);
-  const body = add(HALF_M, [0, 0, HEIGHT_M], engine.EMotionType_Dynamic, 1);
+  add(FLOOR_HALF_M, FLOOR_AT_M, [0, 0, 0, 1], engine.EMotionType_Static, 0);
+  const body = add(HALF_M, [0, 0, HEIGHT_M], [x, y, z, w], engine.EMotionType_Dynamic, 1);
   body.SetLinearVelocity(new engine.Vec3(...SPEED_M_PER_S));
   const contacts = new (adapter('jolt_contacts', 'JoltContacts'))(engine, system);
   contacts.addObject(body, 1);
@@ -144,14 +152,14 @@ async function jolt(stepS) {
   return { step, remove, momentum: () => momentum({ x: speed().GetX(), y: speed().GetY(), z: speed().GetZ() }) };
 }
 
-async function mujoco(stepS) {
+async function mujoco(stepS, [w, x, y, z] = FLAT) {
   const engine = await (await imported('mujoco-js'))();
   engine.FS.mkdir('/drop');
   engine.FS.mount(engine.MEMFS, { root: '.' }, '/drop');
   engine.FS.writeFile('/drop/drop.xml', `<mujoco><option timestep="${stepS}" gravity="0 0 -${GRAVITY_M_PER_S2}"/>
     <default><geom friction="${FRICTION}"/></default>
     <worldbody><geom type="box" size="${FLOOR_HALF_M.join(' ')}" pos="${FLOOR_AT_M.join(' ')}"/>
-    <body pos="0 0 ${HEIGHT_M}"><joint type="free"/>
+    <body pos="0 0 ${HEIGHT_M}" quat="${w} ${x} ${y} ${z}"><joint type="free"/>
     <geom type="box" size="${HALF_M.join(' ')}" mass="${MASS_KG}"/></body>
     </worldbody></mujoco>`);
   const model = engine.MjModel.loadFromXML('/drop/drop.xml');
@@ -184,7 +192,7 @@ async function physxModule() {
 }
 
 let loadedPhysx;
-async function physx(stepS) {
+async function physx(stepS, [w, x, y, z] = FLAT) {
   loadedPhysx ??= physxModule().then((engine) => {
     const foundation = engine.CreateFoundation(engine.PHYSICS_VERSION, new engine.PxDefaultAllocator(),
       new engine.PxDefaultErrorCallback());
@@ -200,17 +208,17 @@ async function physx(stepS) {
     simulationEventCallback: contacts.callback });
   const scene = physics.createScene(description);
   const material = physics.createMaterial(FRICTION, FRICTION, 0);
-  const add = (half, at, create) => {
+  const add = (half, at, turn, create) => {
     const shape = physics.createShape(new engine.PxBoxGeometry(...half), material, true,
       new engine.PxShapeFlags(engine.PxShapeFlagEnum.eSIMULATION_SHAPE));
     shape.setSimulationFilterData(new engine.PxFilterData(1, 1, Contacts.pairFlags(engine), 0));
-    const body = physics[create](new engine.PxTransform(new engine.PxVec3(...at), new engine.PxQuat(0, 0, 0, 1)));
+    const body = physics[create](new engine.PxTransform(new engine.PxVec3(...at), new engine.PxQuat(...turn)));
     body.attachShape(shape);
     scene.addActor(body);
     return body;
   };
-  add(FLOOR_HALF_M, FLOOR_AT_M, 'createRigidStatic');
-  const body = add(HALF_M, [0, 0, HEIGHT_M], 'createRigidDynamic');
+  add(FLOOR_HALF_M, FLOOR_AT_M, [0, 0, 0, 1], 'createRigidStatic');
+  const body = add(HALF_M, [0, 0, HEIGHT_M], [x, y, z, w], 'createRigidDynamic');
   engine.PxRigidBodyExt.prototype.setMassAndUpdateInertia(body, MASS_KG);
   body.setLinearDamping(0);
   body.setAngularDamping(0);
