@@ -21,6 +21,7 @@ class Body:
     friction: float = 0.5
     mass: float = 0          # of the simulation, kg; 0: not simulated
     inertia: numpy.ndarray = None  # kg m^2, about the object's axes
+    damping: tuple = (0, 0)  # the share of the velocity and of the angular one that is lost in a second
     collider: numpy.ndarray = None  # triangles (M, 3, 3) that the simulator collides, if they are others
     rounding: float = 0      # of the collider
     driven: bool = False     # moved by something else than contacts
@@ -103,7 +104,7 @@ def _placed(obj, depsgraph, back):
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], triangles
 
 
-def _read_simulated(body, obj, depsgraph, scale):
+def _read_simulated(body, obj, depsgraph, scale, time_scale):
     """Sets what the simulation has of a rigid body. Its shape is of the mesh before modifiers, unless its source is the
     final one."""
     rigid = obj.rigid_body
@@ -118,6 +119,7 @@ def _read_simulated(body, obj, depsgraph, scale):
     if is_free(obj):
         body.mass = rigid.mass
         body.inertia = scale ** 2 * shapes.moments(rigid, vertices)
+        body.damping = [1 - (1 - share) ** time_scale for share in (rigid.linear_damping, rigid.angular_damping)]
 
 
 def read(obj, scene, depsgraph, moves, simulated):
@@ -137,7 +139,7 @@ def read(obj, scene, depsgraph, moves, simulated):
         raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", obj.name)
     rigid = obj.rigid_body
     if rigid and simulated:
-        _read_simulated(body, obj, depsgraph, scale)
+        _read_simulated(body, obj, depsgraph, scale, scene.rigidbody_world.time_scale)
     if not body.mass:
         body.driven = moves and (simulated or obj.carillon.material == "none")
     return body

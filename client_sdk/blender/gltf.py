@@ -70,7 +70,8 @@ class GltfWriter:
             physics["motion"] = {"isKinematic": True}
         elif body.mass:
             physics["motion"] = {"mass": body.mass, "centerOfMass": [0, 0, 0],
-                                 "inertiaDiagonal": body.inertia.tolist()}
+                                 "inertiaDiagonal": body.inertia.tolist(),
+                                 "extras": dict(zip(("linearDamping", "angularDamping"), body.damping))}
         node["extensions"] = {"KHR_physics_rigid_bodies": physics}
 
     def add_camera(self, name, positions, orientations):

@@ -49,12 +49,20 @@ def _box(half):
     return _hull([[half[axis] * (1 if number >> axis & 1 else -1) for axis in range(3)] for number in range(8)])
 
 
+def _point():
+    """Triangles of a solid that is next to nothing: rounded by its radius it is a sphere."""
+    corners = 1e-6 * numpy.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    return corners[[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]]
+
+
 def collider(rigid, vertices, triangles, scale):
     """What the simulator collides: triangles (M, 3, 3) in units of the scene, or None for the mesh itself; and the
     radius by which it is rounded. `vertices` are without the scale."""
     shape, size = rigid.collision_shape, numpy.ptp(vertices, 0)
     if shape == 'BOX':
         return _box(size / 2 * scale), 0.0
+    if shape == 'SPHERE':
+        return _point(), size.max() / 2 * scale[0]
     if shape == 'MESH':
         return vertices[triangles] * scale, rigid.collision_margin if rigid.use_margin else USUAL_MARGIN
     if shape != 'CONVEX_HULL' or size.min() <= 1e-6:

@@ -110,12 +110,15 @@ PairPlacement ContactSearch::Place(const BodyPair& pair, size_t interval, double
   return {place(pair.a), place(pair.b)};
 }
 
-/// The features of both surfaces, moved outward by their rounding.
+/// The features of both surfaces, moved outward by their rounding. A step of a simulator pushes all
+/// corners at once that would otherwise pass the surface within it; in continuous time only the
+/// first ones.
 std::vector<ContactFeature> ContactSearch::Features(const BodyPair& pair, const PairPlacement& at,
                                                     double reach_m) const {
   std::vector<ContactFeature> features =
       FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b], at,
-                   reach_m + pair.rounding_m, 3 * pair.tolerance_m);
+                   reach_m + pair.rounding_m,
+                   motion_.frames_are_steps ? 2 * reach_m : 3 * pair.tolerance_m);
   if (pair.rounding_m == 0) return features;
   const auto in_scene = [](const BodyPose& pose, const Vector& point) {
     return Vector(pose.position_m + pose.orientation * point);

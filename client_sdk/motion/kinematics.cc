@@ -24,6 +24,8 @@ Vector NearestTurn(const Vector& turn, const Vector& like) {
 BodyMotion::BodyMotion(const MovingBody& body, const Motion& motion)
     : mass_kg_(body.poses.size() > 1 ? body.mass_kg : 0),
       frame_s_(motion.frame_s),
+      kept_(std::pow(1 - body.linear_damping, motion.frame_s)),
+      kept_turn_(std::pow(1 - body.angular_damping, motion.frame_s)),
       gravity_(motion.gravity_m_per_s2),
       centre_m_(body.centre_of_mass_m),
       inertia_(body.mass_kg > 0 ? body.inertia_kg_m2 : Matrix(Matrix::Identity())) {
@@ -87,13 +89,13 @@ void BodyMotion::Know(const std::vector<std::vector<BodyImpulse>>& impulses,
 }
 
 Vector BodyMotion::Impulse(size_t node) const {
-  const Vector jump =
-      places_[node + 1].position_m - 2 * places_[node].position_m + places_[node - 1].position_m;
+  const Vector jump = places_[node + 1].position_m - places_[node].position_m -
+                      kept_ * (places_[node].position_m - places_[node - 1].position_m);
   return mass_kg_ * (jump / frame_s_ - gravity_ * frame_s_);
 }
 
 Vector BodyMotion::Torque(size_t node) const {
-  Vector torque = start_[node] - end_[node - 1];
+  Vector torque = start_[node] - kept_turn_ * end_[node - 1];
   for (const BodyImpulse& impulse : impulses_[node]) {
     torque += (1 - impulse.time_s / frame_s_) * impulse.torque;
   }

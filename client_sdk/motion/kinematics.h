@@ -33,6 +33,7 @@ struct BodyImpulse {
 /// exactly. An impulse J at the share theta of interval k gives P_k (1 - theta) J, and P_{k+1}
 /// theta J. Angular momentum has the same balance with the momentum of the torque-free turn between
 /// two frames; what the impulses of an interval add beyond first order is moved to the right side.
+/// Where a simulator damps velocities, V_{k-1} and its angular momentum are those that it leaves.
 class BodyMotion {
  public:
   BodyMotion(const MovingBody& body, const Motion& motion);
@@ -73,6 +74,7 @@ class BodyMotion {
   void Shoot(size_t interval);
 
   double mass_kg_, frame_s_, radius_m_ = 0;
+  double kept_ = 1, kept_turn_ = 1;  ///< of the velocities of a frame, in the next one
   Vector gravity_, centre_m_;
   Inertia inertia_;
   std::vector<BodyPose> places_;  ///< where the centre of mass is at each frame

@@ -40,6 +40,9 @@ struct MovingBody {
   Vector centre_of_mass_m = Vector::Zero();  ///< in the body's frame
   Matrix inertia_kg_m2 = Matrix::Zero();     ///< about the centre of mass, in the body's axes
   double friction = 0.6;                     ///< a pair has the geometric mean of both
+  /// The share of its velocity and of its angular velocity that the simulator takes from a body in
+  /// a second, whatever it touches.
+  double linear_damping = 0, angular_damping = 0;
   std::vector<BodyPose> poses;               ///< one for each frame, or a single one: a fixed body
 
   const BodySurface& touching() const { return collider.triangles.empty() ? surface : collider; }

@@ -52,6 +52,13 @@ Vector InBody(const GltfMatrix& world, const GltfPoint& point, const BodyPose& p
 void ReadMotion(const json& motion, const GltfMatrix& world, MovingBody& body, SceneBody& about) {
   about.driven = motion.value("isKinematic", false) || motion.value("type", "") == "kinematic";
   about.mass_kg = motion.value("mass", 0.0);
+  const json& extras = Member(motion, "extras");
+  const auto damping = [&extras](const char* key) {
+    const json& share = Member(extras, key);
+    return share.is_number() ? std::clamp(share.get<double>(), 0.0, 1.0) : 0.0;
+  };
+  body.linear_damping = damping("linearDamping");
+  body.angular_damping = damping("angularDamping");
   if (const auto centre = VectorOf(Member(motion, "centerOfMass"))) {
     about.has_centre = true;
     body.centre_of_mass_m =

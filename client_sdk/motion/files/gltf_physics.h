@@ -18,9 +18,10 @@ const nlohmann::json& Member(const nlohmann::json& object, const char* key);
 void AddSurface(const GltfSurface& from, BodySurface& to);
 
 /// Reads what KHR_physics_rigid_bodies and OMI_physics_body say of a node: mass, centre of mass,
-/// inertia, friction, whether it is driven, and the mesh that it collides
-/// (`collider.geometry.mesh`, with `collider.extras.rounding`, its radius of rounding). `world` is
-/// the node's matrix. Throws a fault of glTF.
+/// inertia, friction, whether it is driven, the dampings (`motion.extras.linearDamping` and
+/// `angularDamping`, shares of the velocities that are lost in a second), and the mesh that it
+/// collides (`collider.geometry.mesh`, with `collider.extras.rounding`, its radius of rounding).
+/// `world` is the node's matrix. Throws a fault of glTF.
 void ReadGltfPhysics(const GltfDocument& document, const nlohmann::json& node,
                      const GltfMatrix& world, MovingBody& body, SceneBody& about);
 
