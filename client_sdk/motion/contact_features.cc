@@ -8,7 +8,7 @@
 namespace carillon::motion {
 namespace {
 
-constexpr size_t kMostFeatures = 8;
+constexpr size_t kMostFeatures = 8, kMostInStep = 16;
 constexpr uint64_t kCornerOfA = 0, kCornerOfB = uint64_t{1} << 62U, kEdges = uint64_t{2} << 62U;
 
 Vector ToScene(const BodyPose& pose, const Vector& point) {
@@ -19,9 +19,9 @@ Vector ToBody(const BodyPose& pose, const Vector& point) {
 }
 
 /// Adds the corners of one body that lie near the surface of the other.
-void AddCorners(const SurfaceIndex& of, const SurfaceIndex& on, const BodyPose& of_pose,
-                const BodyPose& on_pose, double reach_m, bool of_is_a,
-                std::vector<ContactFeature>& features) {
+void AddCorners(const SurfaceIndex& of, const SurfaceIndex& on, const PairPlacement& at,
+                double reach_m, bool of_is_a, std::vector<ContactFeature>& features) {
+  const BodyPose &of_pose = of_is_a ? at.a : at.b, &on_pose = of_is_a ? at.b : at.a;
   const Turn turn = on_pose.orientation.conjugate() * of_pose.orientation;
   const Vector shift = ToBody(on_pose, of_pose.position_m);
   Eigen::AlignedBox3d near = on.box();
@@ -90,12 +90,12 @@ void AddEdgePair(const PlacedEdge& a, const PlacedEdge& b, const PairPlacement& 
 }
 
 /// Keeps those farthest apart, beginning with the deepest.
-void KeepSpread(const BodyPose& pose, std::vector<ContactFeature>& features) {
-  if (features.size() <= kMostFeatures) return;
+void KeepSpread(const BodyPose& pose, size_t most, std::vector<ContactFeature>& features) {
+  if (features.size() <= most) return;
   std::ranges::swap(features.front(),
                     *std::ranges::min_element(features, {}, &ContactFeature::gap_m));
   std::vector<double> away(features.size(), std::numeric_limits<double>::max());
-  for (size_t kept = 1; kept < kMostFeatures; ++kept) {
+  for (size_t kept = 1; kept < most; ++kept) {
     const Vector last = ToScene(pose, features[kept - 1].point_a);
     size_t farthest = kept;
     for (size_t i = kept; i < features.size(); ++i) {
@@ -105,16 +105,17 @@ void KeepSpread(const BodyPose& pose, std::vector<ContactFeature>& features) {
     std::swap(features[kept], features[farthest]);
     std::swap(away[kept], away[farthest]);
   }
-  features.resize(kMostFeatures);
+  features.resize(most);
 }
 
 }  // namespace
 
 std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
-                                         const PairPlacement& at, double reach_m, double beyond_m) {
+                                         const PairPlacement& at, double reach_m,
+                                         std::optional<double> beyond_m) {
   std::vector<ContactFeature> features;
-  AddCorners(a, b, at.a, at.b, reach_m, true, features);
-  AddCorners(b, a, at.b, at.a, reach_m, false, features);
+  AddCorners(a, b, at, reach_m, true, features);
+  AddCorners(b, a, at, reach_m, false, features);
   const std::vector<PlacedEdge> edges_a = EdgesNear(a, b, at.a, at.b, reach_m);
   if (!edges_a.empty()) {
     for (const PlacedEdge& edge_b : EdgesNear(b, a, at.b, at.a, reach_m)) {
@@ -122,9 +123,11 @@ std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceInd
     }
   }
   if (features.empty()) return features;
-  const double least = std::ranges::min_element(features, {}, &ContactFeature::gap_m)->gap_m;
-  std::erase_if(features, [&](const ContactFeature& f) { return f.gap_m > least + beyond_m; });
-  KeepSpread(at.a, features);
+  if (beyond_m) {
+    const double least = std::ranges::min_element(features, {}, &ContactFeature::gap_m)->gap_m;
+    std::erase_if(features, [&](const ContactFeature& f) { return f.gap_m > least + *beyond_m; });
+  }
+  KeepSpread(at.a, beyond_m ? kMostFeatures : kMostInStep, features);
   return features;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "client_sdk/motion/motion.h"
@@ -23,8 +24,10 @@ struct PairPlacement {
 };
 
 /// Returns the places at which two bodies that lie so may touch: those with a gap within `reach_m`
-/// of zero, and at most `beyond_m` more than the least. Of many, the ones farthest apart.
+/// of zero, and at most `beyond_m` more than the least; without it all of them.
+/// Of many, the ones farthest apart.
 std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
-                                         const PairPlacement& at, double reach_m, double beyond_m);
+                                         const PairPlacement& at, double reach_m,
+                                         std::optional<double> beyond_m);
 
 }  // namespace carillon::motion

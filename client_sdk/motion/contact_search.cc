@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "client_sdk/motion/in_parallel.h"
 
@@ -17,6 +19,20 @@ constexpr double kStillSpeed = 0.002;
 constexpr double kBinS = 0.004;
 
 double TolerancesOf(double a, double b) { return 0.01 * std::min(a, b); }
+
+/// Leaves one of the features that lie at one place, such as all corners of a sphere's core: the
+/// balance of contacts that do the same converges slowly.
+void MergeCoincident(double tolerance_m, std::vector<ContactFeature>& features) {
+  std::vector<ContactFeature> apart;
+  for (const ContactFeature& feature : features) {
+    const auto coincides = [&](const ContactFeature& other) {
+      return (feature.point_a - other.point_a).norm() < tolerance_m &&
+             (feature.point_b - other.point_b).norm() < tolerance_m;
+    };
+    if (std::ranges::none_of(apart, coincides)) apart.push_back(feature);
+  }
+  features = std::move(apart);
+}
 
 }  // namespace
 
@@ -115,10 +131,10 @@ PairPlacement ContactSearch::Place(const BodyPair& pair, size_t interval, double
 /// first ones.
 std::vector<ContactFeature> ContactSearch::Features(const BodyPair& pair, const PairPlacement& at,
                                                     double reach_m) const {
-  std::vector<ContactFeature> features =
-      FindFeatures(*bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b], at,
-                   reach_m + pair.rounding_m,
-                   motion_.frames_are_steps ? 2 * reach_m : 3 * pair.tolerance_m);
+  std::vector<ContactFeature> features = FindFeatures(
+      *bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b], at, reach_m + pair.rounding_m,
+      motion_.frames_are_steps ? std::nullopt : std::optional(3 * pair.tolerance_m));
+  MergeCoincident(0.01 * pair.tolerance_m, features);
   if (pair.rounding_m == 0) return features;
   const auto in_scene = [](const BodyPose& pose, const Vector& point) {
     return Vector(pose.position_m + pose.orientation * point);

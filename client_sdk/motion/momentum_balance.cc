@@ -206,7 +206,15 @@ void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, 
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const double faint = kFaintGain * before / static_cast<double>(island.size());
     const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
-    if (gained <= end_gain) return;
+    if (gained <= end_gain) {
+      // Nothing is gained while those rest that would gain: all of two, where each sweep begins
+      // with the one that the sweep before has ended with.
+      const auto rests = [](const Active& one) { return one.rests > 0; };
+      if (std::ranges::none_of(island, rests)) return;
+      for (Active& one : island) one.rests = 0;
+      before = 0;
+      continue;
+    }
     Repeat(island, before > 0 ? gained / before : 2);
     before = gained;
   }

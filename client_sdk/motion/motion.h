@@ -43,7 +43,7 @@ struct MovingBody {
   /// The share of its velocity and of its angular velocity that the simulator takes from a body in
   /// a second, whatever it touches.
   double linear_damping = 0, angular_damping = 0;
-  std::vector<BodyPose> poses;               ///< one for each frame, or a single one: a fixed body
+  std::vector<BodyPose> poses;  ///< one for each frame, or a single one: a fixed body
 
   const BodySurface& touching() const { return collider.triangles.empty() ? surface : collider; }
 };

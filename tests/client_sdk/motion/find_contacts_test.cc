@@ -140,6 +140,58 @@ TEST(FindContacts, FindsEqualAndOppositeImpulsesInTheAir) {
   EXPECT_LT(is.median_vector_error, 0.05);
 }
 
+TEST(FindContacts, ExplainsAStepThatPushesBothEndsOfABarAtOnce) {
+  // One end lands and throws the other down, which the step then stops above the floor. Whether it
+  // does so depends on where in a step the bar lands.
+  for (const double tilt : {0.1, 0.2, 0.3, 0.4}) {
+    for (const double height_m : {0.35, 0.4}) {
+      falls::Body bar = BoxOf({0.3, 0.04, 0.01});
+      bar.mass_kg = 1;
+      bar.inertia_kg_m2 = {0.0017 / 12, 0.0901 / 12, 0.0916 / 12};
+      bar.position_m = {0, 0, height_m};
+      bar.orientation = {std::cos(tilt / 2), 0, std::sin(tilt / 2), 0};
+      Fall fall = Drop({.friction = 0.25,
+                        .restitution = 0,
+                        .seconds = 1,
+                        .bodies = {CornerScene().bodies[0], bar}},
+                       falls::FallInBullet, 1, 1.0 / 240);
+      fall.motion.frames_are_steps = true;
+      const auto found = FindContacts(fall.motion);
+      ASSERT_TRUE(found.ok()) << found.status();
+      // If only the lower end may touch, it is above 0.1 in most of these falls.
+      EXPECT_LT(found->confidence.unexplained, 3e-4) << tilt << " " << height_m;
+      const Likeness is = Compare(fall, *found);
+      EXPECT_EQ(is.found_count, is.true_count) << tilt << " " << height_m;
+      EXPECT_LE(is.false_share, 0.03) << tilt << " " << height_m;
+    }
+  }
+}
+
+TEST(FindContacts, KnowsHowASimulatorDampsABody) {
+  constexpr double kDamping = 0.3, kStep = 1.0 / 240, kSide = 0.1;
+  Motion motion;
+  motion.frame_s = kStep;
+  motion.frames_are_steps = true;
+  motion.bodies = {Floor(), Cube(kSide, 1)};
+  double height = 0.5, speed = 0, angle = 0, turning = 3;  // about the vertical
+  const double kept = std::pow(1 - kDamping, kStep);
+  for (int k = 0; k < 240; ++k) {
+    motion.bodies[1].poses.push_back(
+        {{0, 0, height + kSide / 2}, Turn(Eigen::AngleAxisd(angle, Vector::UnitZ()))});
+    speed = height <= 0 && speed < 0 ? -0.9 * speed : kept * speed - kGravity * kStep;
+    turning *= kept;
+    height += speed * kStep;
+    angle += turning * kStep;
+  }
+  const auto undamped = FindContacts(motion);
+  ASSERT_TRUE(undamped.ok()) << undamped.status();
+  EXPECT_GT(undamped->confidence.unexplained, 1e-5);
+  motion.bodies[1].linear_damping = motion.bodies[1].angular_damping = kDamping;
+  const auto damped = FindContacts(motion);
+  ASSERT_TRUE(damped.ok()) << damped.status();
+  EXPECT_LT(damped->confidence.unexplained, 0.1 * undamped->confidence.unexplained);
+}
+
 TEST(FindContacts, TakesRestForALoadOfTheWeight) {
   Motion motion;
   motion.bodies = {Floor(), Cube(0.1, 2)};
