@@ -213,9 +213,10 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
                     const StopSignal& stop, bool json);
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop, bool json);
-/// Renders a trace to a file. As JSON, `members` follow the summary.
-absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json,
-                    std::vector<JsonMember> members = {});
+/// Renders a trace to a file. As JSON, `members` follow the summary. Returns the options by which
+/// another trace is rendered at the same scale, without `normalize`.
+absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
+                                     bool json, std::vector<JsonMember> members = {});
 v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Returns how the sound of a trace is written to the file `path`.
 RenderedForm FormOf(const RenderOptions& options, const std::string& path);

@@ -11,6 +11,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "client_sdk/cli/commands/foley_bodies.h"
 #include "client_sdk/cli/output/job_progress.h"
@@ -35,8 +36,8 @@ constexpr double kAmbiguous = 0.2;
 
 void List(const FoleyScene& foley) {
   const motion::Motion& motion = foley.scene.motion;
-  absl::PrintF("%d frames of %.6g s, from %.6g s on\n", motion.frame_count(), motion.frame_s,
-               motion.first_time_s);
+  absl::PrintF("%d frames of %.6g s, from %.6g s on, where the sound begins\n",
+               motion.frame_count(), motion.frame_s, motion.first_time_s);
   for (size_t i = 0; i < motion.bodies.size(); ++i) {
     const MovingBody& body = motion.bodies[i];
     const FoleyBody& sounds = foley.bodies[i];
@@ -55,16 +56,19 @@ void List(const FoleyScene& foley) {
 
 absl::Status CheckSounds(const FoleyScene& foley) {
   bool sounds = false;
+  std::vector<std::string> open;
   for (size_t i = 0; i < foley.bodies.size(); ++i) {
     if (foley.bodies[i].material.empty()) continue;
     sounds = true;
     if (foley.bodies[i].closed || foley.bodies[i].repair) continue;
+    open.push_back(foley.scene.motion.bodies[i].name);
+  }
+  if (!open.empty()) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "SURFACE_OPEN",
-        absl::StrCat(foley.scene.motion.bodies[i].name,
-                     " is not closed: close its surface, or repair it by --repair '",
-                     foley.scene.motion.bodies[i].name, "', or keep it silent by --material '",
-                     foley.scene.motion.bodies[i].name, "=none'"));
+        absl::StrCat(absl::StrJoin(open, ", "), open.size() == 1 ? " is" : " are",
+                     " not closed: close the surface, or repair it by --repair '", open.front(),
+                     "', or keep it silent by --material '", open.front(), "=none'"));
   }
   if (sounds) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
@@ -81,23 +85,26 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
   const std::string where = absl::StrCat(worst, " near ", absl::SixDigits(time_s), " s");
   if (is.ambiguity > kAmbiguous) {
     absl::FPrintF(stderr,
-                  "warning: other impulses explain the motion as well: %.0f %% of the impulse is "
-                  "open, since several bodies touch within a frame; more frames a second tell\n",
-                  100 * is.ambiguity);
+                  "warning: other impulses explain the motion as well: %.0f %% of the impulse may "
+                  "have acted at another corner or in the next frame%s\n",
+                  100 * is.ambiguity, motion.frames_are_steps ? "" : "; more frames a second tell");
   }
   if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
     absl::FPrintF(stderr,
-                  "warning: %.2g %% of the momentum is unexplained, most of it of %s: masses or "
-                  "shapes differ from those of the simulation\n",
+                  "warning: %.2g %% of the momentum is unexplained, most of it of %s: the contacts "
+                  "there are less sure\n",
                   100 * is.unexplained, EscapedText(where));
   }
   if (is.unexplained <= kWrong || force) return absl::OkStatus();
   if (is.nearest_gap_m > 0.05 * is.worst_radius_m) {
+    const std::string nearest =
+        motion.bodies.size() == 1
+            ? "no other body is there"
+            : absl::StrCat("the nearest surface is ", absl::SixDigits(is.nearest_gap_m), " m away");
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MOTION_WITHOUT_CONTACT",
-        absl::StrCat("the momentum of ", where, " changes, and the nearest surface is ",
-                     absl::SixDigits(is.nearest_gap_m),
-                     " m away: is a floor missing (--floor), the unit (--unit) or --gravity wrong, "
+        absl::StrCat("the momentum of ", where, " changes, and ", nearest,
+                     ": is a floor missing (--floor), the unit (--unit) or --gravity wrong, "
                      "or is the body moved by hand (--driven)? --force renders all the same"));
   }
   return Refusal(
@@ -167,6 +174,47 @@ class FoleyModels {
   std::map<std::string, v1::Job> jobs_;
 };
 
+/// The bodies that have no model, all of which are named at once.
+class ModelFailures {
+ public:
+  void Add(const std::string& name, const absl::Status& status) {
+    const bool mute = ToErrorInfo(status).reason() == "NO_MODE_IN_BAND";
+    (mute ? mute_ : failed_).emplace_back(name, status);
+  }
+
+  /// Bodies without an audible mode stay silent if `others_sound`, with a warning.
+  absl::Status Judge(bool others_sound) const {
+    if (!failed_.empty()) return Together(failed_);
+    if (!mute_.empty() && !others_sound) return Together(mute_);
+    if (!mute_.empty()) {
+      absl::FPrintF(stderr,
+                    "warning: %s: too small or too stiff to be heard; silent, others strike it\n",
+                    EscapedText(absl::StrJoin(mute_, ", ", kName)));
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  using Failure = std::pair<std::string, absl::Status>;
+  static constexpr auto kName = [](std::string* text, const Failure& failure) {
+    absl::StrAppend(text, failure.first);
+  };
+
+  /// The first failure, with the names and the messages of all: bodies of one surface share a job,
+  /// whose label is the name of one of them.
+  static absl::Status Together(const std::vector<Failure>& failures) {
+    const auto add = [](std::string* text, const Failure& failure) {
+      absl::StrAppend(text, failure.first, ": ", ToErrorInfo(failure.second).message());
+    };
+    const absl::Status& first = failures.front().second;
+    v1::ErrorInfo all = ToErrorInfo(first);
+    all.set_message(absl::StrJoin(failures, "; ", add));
+    return FromErrorInfo(first.code(), all);
+  }
+
+  std::vector<Failure> failed_, mute_;
+};
+
 void Set(v1::Pose& to, const motion::BodyPose& from) {
   to.mutable_position_m()->set_x(from.position_m.x());
   to.mutable_position_m()->set_y(from.position_m.y());
@@ -183,14 +231,18 @@ struct FoleyTrace {
   std::vector<v1::ContactTraceObject> objects;
   std::vector<v1::ContactStep> steps;
 
-  /// Writes the trace; with `heard` above zero only that object is heard.
-  absl::Status Write(const std::string& path, uint32_t heard = 0) const {
+  /// Writes the trace, with all times less by `earlier_s`; with `heard` above zero only that object
+  /// is heard.
+  absl::Status Write(const std::string& path, double earlier_s = 0, uint32_t heard = 0) const {
     ASSIGN_OR_RETURN(auto writer, client::ContactTraceWriter::Create(path, header));
     for (v1::ContactTraceObject object : objects) {
       if (heard > 0 && object.handle() != heard) object.set_gain(0);
       writer.Write(object);
     }
-    for (const v1::ContactStep& step : steps) RETURN_IF_ERROR(writer.Write(step));
+    for (v1::ContactStep step : steps) {
+      step.set_time_s(step.time_s() - earlier_s);
+      RETURN_IF_ERROR(writer.Write(step));
+    }
     return writer.Close();
   }
 };
@@ -227,16 +279,23 @@ absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOp
     if (foley.bodies[i].material.empty()) continue;
     RETURN_IF_ERROR(models.Request(motion.bodies[i], foley.bodies[i]));
   }
+  ModelFailures failures;
   for (size_t i = 0; i < motion.bodies.size(); ++i) {
     if (foley.bodies[i].material.empty()) continue;
+    absl::StatusOr<std::string> model = models.Await(motion.bodies[i]);
+    if (!model.ok()) {
+      failures.Add(motion.bodies[i].name, model.status());
+      continue;
+    }
     v1::ContactTraceObject& object = trace.objects.emplace_back();
     settings.handles[i] = static_cast<uint32_t>(trace.objects.size());
     object.set_handle(settings.handles[i]);
     object.set_label(motion.bodies[i].name);
-    ASSIGN_OR_RETURN(*object.mutable_modal_model(), models.Await(motion.bodies[i]));
+    object.set_modal_model(*std::move(model));
     object.mutable_material()->set_preset(foley.bodies[i].material);
     Set(*object.mutable_pose(), motion.bodies[i].poses.front());
   }
+  RETURN_IF_ERROR(failures.Judge(!trace.objects.empty()));
   trace.steps = motion::ToSteps(motion, found, settings);
   if (listener != nullptr && listener->poses.size() > 1) {
     for (size_t k = 0; k < trace.steps.size(); ++k) {
@@ -246,8 +305,9 @@ absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOp
   return trace;
 }
 
+/// Renders stems as `whole` was rendered, so that they add up to it.
 absl::Status RenderStems(const client::Client& daemon, const FoleyOptions& options,
-                         const FoleyTrace& trace, const std::string& temporary) {
+                         const RenderOptions& whole, const FoleyTrace& trace, double earlier_s) {
   std::error_code error;
   fs::create_directories(options.stems, error);
   if (error) {
@@ -255,14 +315,12 @@ absl::Status RenderStems(const client::Client& daemon, const FoleyOptions& optio
                    absl::StrCat(options.stems, ": ", error.message()));
   }
   for (const v1::ContactTraceObject& object : trace.objects) {
-    RETURN_IF_ERROR(trace.Write(temporary, object.handle()));
-    RenderOptions stem = options.sound;
-    stem.trace = temporary;
-    stem.normalize = false;  // stems add up to the sound
+    RETURN_IF_ERROR(trace.Write(whole.trace, earlier_s, object.handle()));
+    RenderOptions stem = whole;
     const std::string name = absl::StrReplaceAll(object.label(), {{"/", "_"}});
     stem.out =
         (fs::path(options.stems) / absl::StrCat(object.handle(), "-", name, ".wav")).string();
-    RETURN_IF_ERROR(Render(daemon, stem, false));
+    RETURN_IF_ERROR(Render(daemon, stem, false).status());
   }
   return absl::OkStatus();
 }
@@ -288,13 +346,16 @@ absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
   };
-  const std::string path = options.trace.empty() ? temporary : options.trace;
-  RETURN_IF_ERROR(trace.Write(path));
+  if (!options.trace.empty()) RETURN_IF_ERROR(trace.Write(options.trace));
   if (options.sound.out.empty()) return absl::OkStatus();
+  // A trace keeps the times of the file; a sound begins with the first pose.
+  const double earlier_s = foley.scene.motion.first_time_s;
   RenderOptions sound = options.sound;
-  sound.trace = path;
-  RETURN_IF_ERROR(Render(*daemon, sound, program.json));
-  return options.stems.empty() ? absl::OkStatus() : RenderStems(*daemon, options, trace, temporary);
+  sound.trace = temporary;
+  RETURN_IF_ERROR(trace.Write(temporary, earlier_s));
+  ASSIGN_OR_RETURN(const RenderOptions whole, Render(*daemon, sound, program.json));
+  return options.stems.empty() ? absl::OkStatus()
+                               : RenderStems(*daemon, options, whole, trace, earlier_s);
 }
 
 }  // namespace carillon::cli

@@ -30,7 +30,8 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
     absl::FPrintF(
         out,
         "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
-        "transfer for the material; `carillon transfer` makes one\n",
+        "transfer for the material: the sound changes once `carillon job list` shows none at work; "
+        "`carillon transfer` makes one that was never begun\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   const double written = summary.peak() * options.gain;
@@ -154,8 +155,8 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
   return absl::OkStatus();
 }
 
-absl::Status Render(const client::Client& daemon, const RenderOptions& options, bool json,
-                    std::vector<JsonMember> members) {
+absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
+                                     bool json, std::vector<JsonMember> members) {
   RenderedFile file(FormOf(options, options.out));
   v1::ContactTraceHeader header;
   RenderedTrace page{.trace = options.trace, .wave = options.out};
@@ -192,7 +193,11 @@ absl::Status Render(const client::Client& daemon, const RenderOptions& options, 
     PrintSummary(options, *summary, options.sample_rate_hz);
     PrintFile(options, file);
   }
-  return absl::OkStatus();
+  RenderOptions alike = options;
+  alike.normalize = false;
+  alike.gain = file.factor();
+  if (settings.has_full_scale_pa()) alike.full_scale_pa = settings.full_scale_pa();
+  return alike;
 }
 
 }  // namespace carillon::cli

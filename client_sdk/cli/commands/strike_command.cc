@@ -248,7 +248,8 @@ absl::Status StrikeToFile(const client::Client& daemon, const StrikeOptions& opt
   rendering.out = options.out;
   rendering.normalize = options.normalize;
   rendering.length_s = options.seconds;
-  return Render(daemon, rendering, json, ModeMembers(ModesOf(model, material, options.size)));
+  return Render(daemon, rendering, json, ModeMembers(ModesOf(model, material, options.size)))
+      .status();
 }
 
 }  // namespace

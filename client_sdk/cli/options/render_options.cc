@@ -146,7 +146,9 @@ void AddRender(CLI::App& app, Program& program) {
     CheckUse(render, *options);
     CheckJson(program, options->out);
     program.command = [&program, options] {
-      if (!IsFolder(options->trace)) return Render(*program.Daemon(), *options, program.json);
+      if (!IsFolder(options->trace)) {
+        return Render(*program.Daemon(), *options, program.json).status();
+      }
       const StopSignal stop;
       return RenderClips(*program.Daemon(), *options, stop, program.json);
     };

@@ -127,11 +127,25 @@ class PoseTextReader {
   MotionScene scene_;
 };
 
+/// True of a file of another program, such as .blend and .fbx, which has zeros near its beginning.
+bool IsBinary(std::ifstream& file) {
+  std::string head(1024, ' ');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  file.clear();
+  file.seekg(0);
+  return head.find('\0') != std::string::npos;
+}
+
 absl::StatusOr<MotionScene> ReadCsv(const std::string& path) {
   std::ifstream file(path);
   if (!file) {
     return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
                    absl::StrCat(path, " cannot be opened"));
+  }
+  if (IsBinary(file)) {
+    return Malformed(path,
+                     "the file is neither a glTF (.glb, .gltf) nor a table of poses (.csv, .npz): "
+                     "export the animation as a glTF");
   }
   PoseTextReader reader(path);
   for (std::string line; std::getline(file, line);) RETURN_IF_ERROR(reader.Read(line));
