@@ -27,7 +27,7 @@ class Bake:
     def __init__(self, context):
         self.scene = context.scene
         self.baked = freshness.digest(self.scene)
-        self.share, self.text, self.result = 0.0, "Saving a copy", None
+        self.share, self.text, self.result = 0.01, "Opening a copy in a second Blender", None
         programs.find("carillon")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="carillon-bake-"))
         copy = self.folder / "copy.blend"
@@ -69,7 +69,7 @@ class Bake:
             raise Fault("BAKE_ENDED", "the Blender in the background ended: " +
                         (self.folder / "log").read_text(errors="replace").strip()[-500:])
         if "reason" in self.result:
-            raise Fault(self.result["reason"], self.result["message"], self.result["body"])
+            raise Fault(self.result["reason"], self.result["message"], self.result["bodies"])
         strip.keep(self.scene, self.folder)
         self.scene.carillon.baked = self.baked
         freshness.look(self.scene)
@@ -145,8 +145,9 @@ class CARILLON_OT_bake(bpy.types.Operator):
 
     def _show(self, scene, fault):
         scene.carillon.fault = str(fault)
-        if fault.body in bpy.data.objects:
-            bpy.data.objects[fault.body].carillon.fault = str(fault)
+        for name in fault.bodies:
+            if name in bpy.data.objects:
+                bpy.data.objects[name].carillon.fault = str(fault)
         self.report({'WARNING'}, str(fault))
 
 

@@ -4,6 +4,7 @@ them."""
 
 import dataclasses
 
+import bpy
 import numpy
 
 from . import settings, shapes
@@ -25,6 +26,7 @@ class Body:
     collider: numpy.ndarray = None  # triangles (M, 3, 3) that the simulator collides, if they are others
     rounding: float = 0      # of the collider
     driven: bool = False     # moved by something else than contacts
+    hints: list = dataclasses.field(default_factory=list)  # why its simulation may look odd, and what to do about it
 
 
 def in_world(scene):
@@ -104,6 +106,30 @@ def _placed(obj, depsgraph, back):
     return vertices @ matrix[:3, :3].T + matrix[:3, 3], triangles
 
 
+def deforms(obj, scene, frames):
+    """True if the mesh of an object changes between frames."""
+    if obj.data.shape_keys is None and not obj.modifiers:
+        return False
+    first = None
+    for frame in frames:
+        scene.frame_set(int(frame))
+        vertices = _surface(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()))[0]
+        first = vertices if first is None else first
+        if len(vertices) != len(first) or (
+                len(first) and numpy.abs(vertices - first).max() > 1e-3 * numpy.ptp(first, 0).max()):
+            return True
+    return False
+
+
+def _hints(obj, vertices):
+    rigid = obj.rigid_body
+    if shapes.is_off_centre(rigid, vertices):
+        yield (f"the simulator puts the shape {rigid.collision_shape.title()} around the object's origin, which is not "
+               "in the middle of its mesh: Object > Set Origin > Origin to Geometry")
+    if rigid.collision_shape == 'MESH' and is_free(obj):
+        yield "with the shape Mesh what moves jitters in Blender's simulator: choose Convex Hull, or Compound Parent"
+
+
 def _read_simulated(body, obj, depsgraph, scale, time_scale):
     """Sets what the simulation has of a rigid body. Its shape is of the mesh before modifiers, unless its source is the
     final one."""
@@ -111,6 +137,7 @@ def _read_simulated(body, obj, depsgraph, scale, time_scale):
     of = obj.evaluated_get(depsgraph) if rigid.mesh_source == 'FINAL' else obj
     vertices, triangles = _surface(of)
     body.friction = rigid.friction
+    body.hints = list(_hints(obj, vertices))
     if rigid.collision_shape != 'COMPOUND':
         own_scale = numpy.linalg.norm(numpy.asarray(obj.matrix_world, float)[:3, :3], axis=0)
         body.collider, rounding = shapes.collider(rigid, vertices, triangles, own_scale)
@@ -136,7 +163,7 @@ def read(obj, scene, depsgraph, moves, simulated):
     body = Body(obj.name, scale * numpy.concatenate(vertices),
                 numpy.concatenate([part + at for part, at in zip(triangles, first)]), settings.guessed_material(obj))
     if not len(body.triangles):
-        raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", obj.name)
+        raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", [obj.name])
     rigid = obj.rigid_body
     if rigid and simulated:
         _read_simulated(body, obj, depsgraph, scale, scene.rigidbody_world.time_scale)

@@ -8,7 +8,7 @@ import bpy
 import numpy
 from bpy.app.handlers import persistent
 
-from . import bodies
+from . import bodies, strip
 
 # What only says how Blender shows a thing, or what follows from other things.
 SHOWN_ONLY = {"name", "show_expanded", "show_in_editmode", "show_on_cage", "is_active", "show_viewport", "show_render"}
@@ -104,7 +104,7 @@ def _add_plain(add, owner, moved):
 def look(scene):
     """Marks the sound of a scene as out of date, or as good again."""
     chosen = scene.carillon
-    stale = bool(chosen.baked) and chosen.baked != digest(scene)
+    stale = bool(chosen.baked) and (chosen.baked != digest(scene) or not strip.is_there(scene))
     if chosen.out_of_date != stale:
         chosen.out_of_date = stale
         for window in bpy.context.window_manager.windows:

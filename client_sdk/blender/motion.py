@@ -21,6 +21,7 @@ class Motion:
     frames_per_s: float
     how: str                 # what the poses are, as text
     steps: bool = False      # each frame is a step of the simulation
+    shown: tuple = (1, 24)   # the scene's first frame, and its frames a second
 
     def write(self, path, scene):
         scale = settings.metres_per_unit(scene)
@@ -28,7 +29,7 @@ class Motion:
         placed = [bodies.split(matrices) for matrices in self.matrices]
         for body, (positions, turns) in zip(self.bodies, placed):
             writer.add_body(body, scale * positions, turns)
-        if scene.camera:
+        if scene.camera and scene.carillon.use_camera:
             writer.add_camera("camera", scale * placed[-1][0], placed[-1][1])
         writer.write(path)
 
@@ -44,7 +45,22 @@ def read(scene, tell):
                                "objects that sound a material, and their floor the material none")
     free = [obj for obj in objects if obj in bodies.in_world(scene) and bodies.is_free(obj)]
     tell(0.05, "Reading the animation")
-    return _read_simulated(scene, objects, free, tell) if free else _read_keyed(scene, objects)
+    shown = scene.frame_start, rebake.frames_per_s(scene)
+    found = _read_simulated(scene, objects, free, tell) if free else _read_keyed(scene, objects)
+    found.shown = shown
+    return found
+
+
+def _check_rigid(scene, objects):
+    """Refuses objects whose mesh changes: only rigid bodies have impulses."""
+    if scene.carillon.force:
+        return
+    frames = numpy.linspace(scene.frame_start, scene.frame_end, 5).round()
+    names = [obj.name for obj in objects if bodies.deforms(obj, scene, frames)]
+    if names:
+        raise Fault("BODY_DEFORMS", f"{', '.join(names)}: shape keys or modifiers change the shape, and only what keeps "
+                                    "its shape can be heard: take them away, or the material and the rigid body",
+                    names)
 
 
 def _surfaces(scene, objects, matrices, simulated):
@@ -60,6 +76,7 @@ def _read_keyed(scene, objects):
     n = scene.carillon.sub_frames or _key_density(objects)
     frames = scene.frame_start + numpy.arange((scene.frame_end - scene.frame_start) * n + 1) / n
     matrices = rebake.poses(scene, [*objects, None], frames)
+    _check_rigid(scene, objects)
     scene.frame_set(scene.frame_start)
     return Motion(_surfaces(scene, objects, matrices, False), matrices, n * rebake.frames_per_s(scene),
                   "the keys, one pose for each frame" if n == 1 else f"the keys, {n} poses for each frame")
@@ -81,6 +98,7 @@ def _read_simulated(scene, objects, free, tell):
     rate, n = rebake.frames_per_s(scene), scene.carillon.sub_frames or rebake.divisor(scene)
     steps = scene.rigidbody_world.substeps_per_frame
     seen = rebake.poses(scene, [*objects, None], range(begin, last + 1))
+    _check_rigid(scene, objects)
     scene.frame_set(begin)
     surfaces = _surfaces(scene, objects, seen, True)
     matrices, how = seen, "the frames of the simulation"

@@ -2,6 +2,7 @@
 """The programs of Carillon that the add-on runs: `carillon`, and `carillond` where none answers."""
 
 import contextlib
+import os
 import shutil
 import subprocess
 import tempfile
@@ -9,11 +10,11 @@ import threading
 
 
 class Fault(Exception):
-    """A failure with its name (proto/README.md, and those of docs/blender.md), and the object concerned."""
+    """A failure with its name (proto/errors.md, and those of docs/blender.md), and the objects concerned."""
 
-    def __init__(self, reason, message, body=""):
+    def __init__(self, reason, message, bodies=()):
         super().__init__(f"{reason}: {message}")
-        self.reason, self.message, self.body = reason, message, body
+        self.reason, self.message, self.bodies = reason, message, bodies
 
 
 def find(name):
@@ -32,6 +33,9 @@ def daemon():
     if subprocess.run([carillon, "material"], capture_output=True).returncode == 0:
         yield []
         return
+    if os.environ.get("CARILLON_SERVER"):
+        raise Fault("SERVER_UNAVAILABLE", f"no carillond answers at {os.environ['CARILLON_SERVER']}, which "
+                                          "CARILLON_SERVER names: start it there, or unset the variable")
     with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
         server = f"unix:{folder}/socket"
         with open(f"{folder}/log", "w+", encoding="utf-8") as log:

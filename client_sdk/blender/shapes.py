@@ -49,9 +49,9 @@ def _box(half):
     return _hull([[half[axis] * (1 if number >> axis & 1 else -1) for axis in range(3)] for number in range(8)])
 
 
-def _point():
-    """Triangles of a solid that is next to nothing: rounded by its radius it is a sphere."""
-    corners = 1e-6 * numpy.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+def _core(radius):
+    """Triangles of a solid that is next to nothing beside a radius: rounded by this radius it is a sphere."""
+    corners = 1e-5 * radius * numpy.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     return corners[[[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]]
 
 
@@ -62,7 +62,8 @@ def collider(rigid, vertices, triangles, scale):
     if shape == 'BOX':
         return _box(size / 2 * scale), 0.0
     if shape == 'SPHERE':
-        return _point(), size.max() / 2 * scale[0]
+        radius = size.max() / 2 * scale[0]
+        return _core(radius), radius
     if shape == 'MESH':
         return vertices[triangles] * scale, rigid.collision_margin if rigid.use_margin else USUAL_MARGIN
     if shape != 'CONVEX_HULL' or size.min() <= 1e-6:
@@ -74,6 +75,14 @@ def collider(rigid, vertices, triangles, scale):
     if inner is None:
         return hull * scale, 0.0
     return _hull(inner) * scale, USUAL_MARGIN * scale.min()
+
+
+def is_off_centre(rigid, vertices):
+    """True if the simulator's shape lies elsewhere than the mesh: it puts all but hulls and meshes around the origin of
+    the object."""
+    away = numpy.linalg.norm(vertices.min(0) + vertices.max(0)) / 2
+    return rigid.collision_shape in {'BOX', 'SPHERE', 'CAPSULE', 'CYLINDER', 'CONE'} and (
+        away > 0.05 * numpy.ptp(vertices, 0).max())
 
 
 def moments(rigid, vertices):

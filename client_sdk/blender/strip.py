@@ -11,11 +11,17 @@ import bpy
 from .programs import Fault
 
 KEY = "carillon"  # the custom property of a strip: "sound", or the name of a stem
+BAKED = "carillon_start"  # that of the frame at which its bake put it
 
 
 def _strips(scene):
     editor = scene.sequence_editor or scene.sequence_editor_create()
     return getattr(editor, "strips", None) or editor.sequences
+
+
+def is_there(scene):
+    """True if the sequencer has the sound of a bake."""
+    return scene.sequence_editor is not None and any(strip.get(KEY) == "sound" for strip in _strips(scene))
 
 
 def folder_of(scene):
@@ -50,16 +56,17 @@ def keep(scene, made):
 
 
 def _placed(strip):
-    return {"channel": strip.channel, "volume": strip.volume, "mute": strip.mute, "pan": strip.pan}
+    return {"channel": strip.channel, "volume": strip.volume, "mute": strip.mute, "pan": strip.pan,
+            "moved": round(strip.frame_start - strip.get(BAKED, strip.frame_start))}
 
 
 def _add(scene, name, path, before, channel, mute=False):
     kept = before.get(name, {"channel": channel, "mute": mute})
     strip = _strips(scene).new_sound("Carillon" if name == "sound" else f"Carillon {name}", os.fspath(path),
-                                     min(kept["channel"], 32), scene.frame_start)
-    strip[KEY] = name
+                                     min(kept["channel"], 32), scene.frame_start + kept.get("moved", 0))
+    strip[KEY], strip[BAKED] = name, scene.frame_start
     for key, value in kept.items():
-        if key != "channel":
+        if key not in ("channel", "moved"):
             setattr(strip, key, value)
     if bpy.data.filepath:
         strip.sound.filepath = bpy.path.relpath(os.fspath(path))

@@ -17,13 +17,9 @@ MARK = "carillon-bake: "
 
 # What the advice of `carillon foley`, which names its options, is in Blender.
 ADVICE = {
-    "SURFACE_OPEN": "close its mesh, or tick Repair in its physics properties, or give it the material none",
-    "NO_MODE_IN_BAND": "it is too small or too stiff to be heard: give it a Wall, a softer material, or the material "
-                       "none",
-    "MOTION_UNEXPLAINED": "its motion is not that of a body that falls and strikes: see docs/blender.md, or tick Bake "
-                          "All the Same",
-    "MOTION_WITHOUT_CONTACT": "nothing is near where its motion changes: give the floor the material none, or see that "
-                              "the scene's unit is right",
+    "SURFACE_OPEN": "the surface is not closed: close the mesh, or tick Repair in the physics properties, or give it "
+                    "the material none",
+    "NO_MODE_IN_BAND": "too small or too stiff to be heard: nothing else has a material, so that nothing sounds",
     "NO_MOTION": "nothing that takes part moves: give what moves a rigid body or a material",
 }
 
@@ -38,6 +34,7 @@ def main(folder):
     folder = pathlib.Path(folder)
     scene = bpy.context.scene
     try:
+        tell(progress=0.02, text="Looking for the daemon")
         with programs.daemon() as server:
             programs.read_materials(server)
             gravity = _gravity(scene)
@@ -46,9 +43,10 @@ def main(folder):
             scene = bpy.context.scene
             found.write(folder / "motion.glb", scene)
             report = _foley(server, scene, found, gravity, folder)
-        tell(done=report, how=found.how)
+        hints = [f"warning: {body.name}: {hint}" for body in found.bodies for hint in body.hints]
+        tell(done=report + hints, how=found.how)
     except Fault as fault:
-        tell(reason=fault.reason, message=fault.message, body=fault.body)
+        tell(reason=fault.reason, message=fault.message, bodies=list(fault.bodies))
 
 
 def _gravity(scene):
@@ -61,11 +59,43 @@ def _gravity(scene):
 
 
 def _check_materials(found):
-    for body in found.bodies:
-        chosen = bpy.data.objects[body.name].carillon.material
-        if chosen and chosen != "none" and chosen not in programs.materials():
-            raise Fault("MATERIAL_UNKNOWN", f"{body.name}: no material has the name {chosen}: choose one of the list",
-                        body.name)
+    chosen = {body.name: bpy.data.objects[body.name].carillon.material or body.material for body in found.bodies}
+    unknown = [name for name, material in chosen.items() if material not in ("", "none", *programs.materials())]
+    if unknown:
+        raise Fault("UNKNOWN_MATERIAL", ", ".join(f"{name}: no material has the name {chosen[name]}" for name in unknown)
+                    + ": choose one of the list", unknown)
+    if not any(material not in ("", "none") for material in chosen.values()):
+        raise Fault("NO_MATERIAL", "no object has a material of Carillon: choose one in Physics properties > Carillon, "
+                                   "or give the object a Blender material of that name")
+
+
+def _causes(scene, found, name, reason):
+    """What makes Blender move a body as no contacts do, and what to do about it."""
+    body = next((body for body in found.bodies if body.name == name), None)
+    causes = list(body.hints) if body else []
+    for obj in scene.objects:
+        held = obj.rigid_body_constraint
+        if held and held.enabled and any(end and end.name == name for end in (held.object1, held.object2)):
+            causes.append(f"{obj.name}, a constraint, holds it, which is not heard yet")
+    size = sum(g * g for g in _gravity(scene)) ** 0.5
+    if scene.use_gravity and not 3 < size < 30:
+        causes.append(f"gravity is {size:.3g} m/s^2: see Scene > Gravity, and Units > Unit Scale")
+    if body and not body.mass:
+        causes.append("it is keyed, and must move as a body falls and strikes: eased or bent keys do not, and a turn "
+                      "by hand does not")
+    if reason == "MOTION_WITHOUT_CONTACT":
+        causes.append("if a floor without a rigid body is there, give it the material none")
+    return "; ".join(causes or ["something else than contacts and gravity moves it, such as a force field"])
+
+
+def _in_blender(text, found):
+    """A message of `carillon foley` in the words of the panel: frames instead of seconds, settings instead of
+    options."""
+    first, rate = found.shown
+    text = re.sub(r"near ([\d.e-]+) s\b", lambda at: f"near frame {first + float(at[1]) * rate:.1f}", text)
+    text = re.sub(r"--wall (\d[\d.e-]*)", r"a Wall of \1 m", text)
+    text = re.sub(r"^carillon: (?=try )", "", text, flags=re.MULTILINE)
+    return re.sub(r"\(?--(wall|repair)\b\)?", lambda option: option[1].title(), text)
 
 
 def _words(scene, found, folder):
@@ -101,14 +131,20 @@ def _foley(server, scene, found, gravity, folder):
         if line and not line.startswith(("carillon:", "warning:")):
             tell(progress=0.5, text=line)
     if process.wait() == 0:
-        return [line for line in lines if "unexplained" in line or line.startswith("warning:")]
+        return [_in_blender(line, found) for line in lines if "unexplained" in line or line.startswith("warning:")]
     text = "\n".join(lines)
     refusal = re.search(r"^carillon: ([A-Z_]+): (.*)", text, re.MULTILINE | re.DOTALL)
     reason, message = refusal.groups() if refusal else ("FOLEY_FAILED", text)
-    named = [body.name for body in found.bodies if re.search(rf"(?<!\w){re.escape(body.name)}(?!\w)", message)]
-    named += re.findall(r"^(.+?) +\d+ %  failed$", text, re.MULTILINE)  # the job of a model
-    body = max(named, key=len, default="")
-    if reason in ADVICE:
-        what = re.sub(r"^\S*motion\.glb: ", "", message).split(": ")
-        message = ": ".join([*what[:2 if what[0] == body else 1], ADVICE[reason]])
-    raise Fault(reason, message, body)
+    # Not "Cube" where "Cube.001" is named.
+    named = {body.name for body in found.bodies
+             if re.search(rf"(?<![\w.]){re.escape(body.name)}(?!\w|\.\w)", message)}
+    named |= set(re.findall(r"^(.+?) +\d+ %  failed$", text, re.MULTILINE))  # the jobs of models
+    named = sorted(named)
+    what = re.sub(r"^\S*motion\.glb: ", "", message)
+    if reason.startswith("MOTION_UN") or reason == "MOTION_WITHOUT_CONTACT":
+        advice = _causes(scene, found, named[0] if named else "", reason) + "; or tick Bake All the Same"
+        message = f"{what.split(': ')[0]}: {advice}"
+    elif reason in ADVICE:
+        about = f"{', '.join(named)}: " if named else ""
+        message = about + ADVICE[reason]
+    raise Fault(reason, _in_blender(message, found), named)
