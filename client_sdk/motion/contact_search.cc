@@ -134,8 +134,8 @@ std::vector<ContactFeature> ContactSearch::Features(const BodyPair& pair, const 
   std::vector<ContactFeature> features = FindFeatures(
       *bodies_.surfaces[pair.a], *bodies_.surfaces[pair.b], at, reach_m + pair.rounding_m,
       motion_.frames_are_steps ? std::nullopt : std::optional(3 * pair.tolerance_m));
-  MergeCoincident(0.01 * pair.tolerance_m, features);
   if (pair.rounding_m == 0) return features;
+  MergeCoincident(0.01 * pair.tolerance_m, features);
   const auto in_scene = [](const BodyPose& pose, const Vector& point) {
     return Vector(pose.position_m + pose.orientation * point);
   };

@@ -168,7 +168,8 @@ double MomentumBalance::Sweep(std::span<Active> island, double cost_factor, doub
     const Vector pull = Gradient(u) + one.hessian * value;
     const Vector change = Best(one, pull, cost_factor * u.cost) - value;
     const double gain = change.dot(one.hessian * change);
-    one.rests = gain <= faint_gain ? kRestSweeps : 0;
+    // The first to change may be the one that the sweep before has ended with, and gain nothing.
+    one.rests = gain <= faint_gain && gained > 0 ? kRestSweeps : 0;
     if (gain == 0) continue;
     one.step = change;
     value += change;
@@ -203,18 +204,18 @@ void MomentumBalance::Repeat(std::span<Active> island, double share) {
 void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double end_gain) {
   constexpr int kMostSweeps = 100;
   double before = 0;
+  bool all_took_part = true;
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const double faint = kFaintGain * before / static_cast<double>(island.size());
     const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
     if (gained <= end_gain) {
-      // Nothing is gained while those rest that would gain: all of two, where each sweep begins
-      // with the one that the sweep before has ended with.
-      const auto rests = [](const Active& one) { return one.rests > 0; };
-      if (std::ranges::none_of(island, rests)) return;
+      if (all_took_part) return;
       for (Active& one : island) one.rests = 0;
+      all_took_part = true;
       before = 0;
       continue;
     }
+    all_took_part = false;
     Repeat(island, before > 0 ? gained / before : 2);
     before = gained;
   }
