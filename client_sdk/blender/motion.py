@@ -58,9 +58,9 @@ def _check_rigid(scene, objects):
     frames = numpy.linspace(scene.frame_start, scene.frame_end, 5).round()
     names = [obj.name for obj in objects if bodies.deforms(obj, scene, frames)]
     if names:
-        raise Fault("BODY_DEFORMS", f"{', '.join(names)}: shape keys or modifiers change the shape, and only what keeps "
-                                    "its shape can be heard: take them away, or the material and the rigid body",
-                    names)
+        raise Fault("BODY_DEFORMS", f"{', '.join(names)}: shape keys or modifiers change the shape, and only what "
+                                    "keeps its shape can be heard: take them away, or the material and the rigid "
+                                    "body", names)
 
 
 def _surfaces(scene, objects, matrices, simulated):

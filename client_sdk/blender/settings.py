@@ -37,8 +37,8 @@ class CarillonScene(bpy.types.PropertyGroup):
     use_camera: BoolProperty(name="Hear from the Camera", default=True, update=changed,
                              description="Distance and direction are those from the scene's camera")
     normalize: BoolProperty(name="Normalize", default=True, update=changed,
-                            description="Scale the sound to its peak, and its stems alike. Otherwise a sample of full scale "
-                                        "is 200 Pa")
+                            description="Scale the sound to its peak, and its stems alike. Otherwise a sample of full "
+                                        "scale is 200 Pa")
     gain_db: FloatProperty(name="Gain", default=0, soft_min=-60, soft_max=60, update=changed,
                            description="Decibels added to the sound and to its stems")
     striker: EnumProperty(

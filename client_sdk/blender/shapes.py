@@ -85,6 +85,12 @@ def is_off_centre(rigid, vertices):
         away > 0.05 * numpy.ptp(vertices, 0).max())
 
 
+def is_thinner_than_margin(rigid, dimensions):
+    """True of a shape that the simulator may keep away from what it touches, since its margin has no room within."""
+    return not rigid.use_margin and (rigid.collision_shape == 'MESH' or (
+        rigid.collision_shape in {'BOX', 'CYLINDER'} and min(dimensions) < 2 * USUAL_MARGIN))
+
+
 def moments(rigid, vertices):
     """Moments of inertia about the object's axes, in kilograms times the square of the scene's unit."""
     shape, mass, size = rigid.collision_shape, rigid.mass, numpy.ptp(vertices, 0)

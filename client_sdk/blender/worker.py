@@ -9,7 +9,7 @@ import subprocess
 
 import bpy
 
-from . import motion, programs, settings
+from . import motion, programs, settings, shapes
 from .programs import Fault
 
 MARK = "carillon-bake: "
@@ -62,8 +62,8 @@ def _check_materials(found):
     chosen = {body.name: bpy.data.objects[body.name].carillon.material or body.material for body in found.bodies}
     unknown = [name for name, material in chosen.items() if material not in ("", "none", *programs.materials())]
     if unknown:
-        raise Fault("UNKNOWN_MATERIAL", ", ".join(f"{name}: no material has the name {chosen[name]}" for name in unknown)
-                    + ": choose one of the list", unknown)
+        missing = ", ".join(f"{name}: no material has the name {chosen[name]}" for name in unknown)
+        raise Fault("UNKNOWN_MATERIAL", f"{missing}: choose one of the list", unknown)
     if not any(material not in ("", "none") for material in chosen.values()):
         raise Fault("NO_MATERIAL", "no object has a material of Carillon: choose one in Physics properties > Carillon, "
                                    "or give the object a Blender material of that name")
@@ -77,6 +77,9 @@ def _causes(scene, found, name, reason):
         held = obj.rigid_body_constraint
         if held and held.enabled and any(end and end.name == name for end in (held.object1, held.object2)):
             causes.append(f"{obj.name}, a constraint, holds it, which is not heard yet")
+        if obj.name == name and obj.rigid_body and shapes.is_thinner_than_margin(obj.rigid_body, obj.dimensions):
+            causes.append("it is thinner than the margin of 4 cm that the simulator gives it: tick Rigid Body > "
+                          "Sensitivity > Collision Margin, and set 0.001 m")
     size = sum(g * g for g in _gravity(scene)) ** 0.5
     if scene.use_gravity and not 3 < size < 30:
         causes.append(f"gravity is {size:.3g} m/s^2: see Scene > Gravity, and Units > Unit Scale")

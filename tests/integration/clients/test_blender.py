@@ -99,14 +99,25 @@ class BlenderTest(unittest.TestCase):
             "friction": True, "shape": True, "all again": False})
 
     def test_what_fails_has_a_name_and_leaves_the_strip(self):
-        for case, reason, body in (("material", "MATERIAL_UNKNOWN", "Bar [1]"), ("time", "TIME_REMAPPED", None),
-                                   ("programs", "CARILLON_MISSING", None), ("open", "SURFACE_OPEN", "Bar [1]")):
+        for case, reason, body in (("material", "UNKNOWN_MATERIAL", "Bar [1]"), ("time", "TIME_REMAPPED", None),
+                                   ("programs", "CARILLON_MISSING", None), ("open", "SURFACE_OPEN", "Bar [1]"),
+                                   ("no material", "NO_MATERIAL", None), ("shape keys", "BODY_DEFORMS", "Bar [1]")):
             refused = self.found["refused"][case]
             self.assertEqual(refused["result"], ["CANCELLED"], case)
             self.assertTrue(refused["fault"].startswith(reason + ": "), refused)
             self.assertEqual(list(refused["faults"]), [body] if body else [], case)
         self.assertEqual(self.found["strips after refusals"], self.found["strips"])
         self.assertTrue(self.found["still"]["fault"].startswith("NO_MOTION: "), self.found["still"])
+
+    def test_bodies_with_usual_settings_are_explained_and_small_ones_stay_silent(self):
+        report = self.found["usual"]["report"]
+        self.assertEqual(self.found["usual"]["result"], ["FINISHED"], self.found["usual"])
+        self.assertLess(float(report.split("unexplained ")[1].split()[0]), 0.1)
+        self.assertRegex(report, "(?m)^warning: Ball: ")
+
+    def test_a_strip_stays_where_it_was_moved_and_is_missed_when_it_is_deleted(self):
+        self.assertEqual([strip["start"] for strip in self.found["usual strips"]], [8])
+        self.assertEqual(self.found["stale"], [False, True])
 
     def test_keys_are_heard_without_a_simulation(self):
         self.assertEqual(self.found["keyed"]["result"], ["FINISHED"], self.found["keyed"])

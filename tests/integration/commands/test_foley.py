@@ -239,8 +239,9 @@ class FoleyTest(DaemonTest):
         sounds = [self.folder / f"{name}.wav" for name in ("fall", "later")]
         for out in sounds:
             self.foley(out.with_suffix(".glb").name, "--out", out, "--tail", 0.1)
-        first, later = map(sound.read_wave, sounds)
-        numpy.testing.assert_allclose(later, first, atol=1e-3 * numpy.abs(first).max())
+        first, later = (sound.read_wave(out)[:, 0] for out in sounds)
+        # The file's times have single precision, so that a blow is some microseconds apart.
+        self.assertGreater(first @ later, 0.98 * numpy.linalg.norm(first) * numpy.linalg.norm(later))
 
     def test_stems_have_the_scale_of_a_normalized_sound(self):
         out = self.folder / "normal.wav"

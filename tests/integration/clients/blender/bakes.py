@@ -131,7 +131,45 @@ def failures(scene, bar):
     mesh.to_mesh(bar.data)
     mesh.free()
     refused["open"] = bake(scene)
+    bar.carillon.material = ""
+    refused["no material"] = bake(scene)
+    bar.carillon.material = "structural_steel"
+    bar.shape_key_add(name="Basis")
+    key = bar.shape_key_add(name="Long")
+    key.data[0].co.x -= 0.2
+    for frame, value in ((5, 0), (30, 1)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+    refused["shape keys"] = bake(scene)
     found["strips after refusals"] = strips(scene)
+
+
+def usual():
+    """Two bodies with the settings that Blender gives them: a tilted bar, whose ends a step of the simulation pushes at
+    once, and a steel ball, which is too small to be heard and passes the floor by half its radius within a step."""
+    scene = empty_scene("usual", 24)
+    scene.carillon.stems = False
+    bpy.ops.rigidbody.world_add()
+    add("Ground", 'PASSIVE', (0, 0, -0.05), (4, 4, 0.1)).rigid_body.collision_shape = 'BOX'
+    bar = add("Tilted", 'ACTIVE', (0, 0, 0.4), (0.3, 0.04, 0.01), (0, 0.4, 0))
+    bpy.ops.object.transform_apply(location=False, rotation=False)
+    bar.rigid_body.collision_shape, bar.rigid_body.restitution = 'BOX', 0
+    bar.carillon.material = "soda_lime_glass"
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.015, location=(0.6, 0, 0.35))
+    ball = bpy.context.object
+    ball.name = "Ball"
+    bpy.ops.rigidbody.object_add(type='ACTIVE')
+    ball.rigid_body.collision_shape = 'SPHERE'
+    ball.carillon.material = "structural_steel"
+    found["usual"] = bake(scene)
+    scene.sequence_editor.sequences["Carillon"].frame_start += 7
+    found["baked again"] = bake(scene)
+    found["usual strips"] = strips(scene)
+    freshness.look(scene)
+    found["stale"] = [scene.carillon.out_of_date]
+    scene.sequence_editor.sequences.remove(scene.sequence_editor.sequences["Carillon"])
+    freshness.look(scene)
+    found["stale"].append(scene.carillon.out_of_date)
 
 
 def keyed():
@@ -159,5 +197,6 @@ fall_scene, fall_bar = fall()
 freshness_of(fall_scene, fall_bar)
 failures(fall_scene, fall_bar)
 keyed()
+usual()
 carillon_blender.unregister()
 (FOLDER / "bakes.json").write_text(json.dumps(found))
