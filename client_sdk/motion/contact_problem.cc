@@ -46,7 +46,9 @@ ContactProblem::ContactProblem(const Motion& motion, const SearchBodies& bodies,
       candidates_(std::move(candidates)),
       blows_of_pair_(search.pairs().size()),
       loads_of_pair_(search.pairs().size()),
-      balance_(bodies.motions.size(), motion.frame_count()) {
+      // A blow and a load at one frame do nearly the same, and must not stop each other halfway.
+      // Between frames this gives more even, but no better shares of what is ambiguous.
+      balance_(bodies.motions.size(), motion.frame_count(), motion.frames_are_steps) {
   for (const BodyMotion& body : bodies.motions) balanced_.push_back(body.balanced());
   AddNodes(motion, bodies, search);
   for (size_t i = 0; i < candidates_.size(); ++i) {

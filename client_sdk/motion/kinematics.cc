@@ -89,8 +89,9 @@ void BodyMotion::Know(const std::vector<std::vector<BodyImpulse>>& impulses,
 }
 
 Vector BodyMotion::Impulse(size_t node) const {
-  const Vector jump = places_[node + 1].position_m - places_[node].position_m -
-                      kept_ * (places_[node].position_m - places_[node - 1].position_m);
+  const Vector jump = places_[node + 1].position_m - 2 * places_[node].position_m +
+                      places_[node - 1].position_m +
+                      (1 - kept_) * (places_[node].position_m - places_[node - 1].position_m);
   return mass_kg_ * (jump / frame_s_ - gravity_ * frame_s_);
 }
 
