@@ -353,6 +353,14 @@ test('with less motion a mode stands still, and its nodal lines are seen without
   assert.ok(Math.max(node, otherNode) < 0.7 * Math.min(end, middle, otherEnd), `${[end, node, middle, otherNode, otherEnd]}`);
 }));
 
+test('the first click turns the sound on, also on its button', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.waitForFunction(() => carillonConsole.state.sceneName() && carillonConsole.state.mixer.value && !carillonConsole.state.busy.value);
+  await page.getByRole('button', { name: 'Sound here: off' }).click();
+  await page.waitForFunction(() => carillonConsole.player.node);
+  await page.getByRole('button', { name: 'Sound here: on' }).click();
+  await page.waitForFunction(() => !carillonConsole.player.node);
+}));
+
 test('a refused mesh is shown with the place that is wrong, and repaired by a button', { timeout: 400000 }, () => inBrowser(async (page) => {
   await page.locator('input[type=file]').setInputFiles(process.env.CARILLON_TEST_OPEN);
   await page.getByText('MESH_NOT_CLOSED').or(page.getByText('open edges')).waitFor();

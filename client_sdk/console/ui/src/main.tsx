@@ -27,7 +27,7 @@ function Header() {
     <span>{sounding.value && player.underruns ? `${player.underruns} gaps` : ''}</span>
     <label class="volume">Volume here <input type="range" min="0" max="60" step="1" value={player.volumeDb}
       onInput={(event) => { player.volumeDb = Number(event.currentTarget.value); }} /></label>
-    <button aria-pressed={sounding.value} title={hasDevice() ? 'The daemon sounds on its own device' : ''} onClick={() => void toggleSound()}>
+    <button class="sound" aria-pressed={sounding.value} title={hasDevice() ? 'The daemon sounds on its own device' : ''} onClick={() => void toggleSound()}>
       {sounding.value ? 'Sound here: on' : 'Sound here: off'}</button></header>;
 }
 

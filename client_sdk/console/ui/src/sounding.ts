@@ -43,7 +43,9 @@ export async function hear(scene: string): Promise<void> {
 export const hasDevice = () => !/^(null|file)/.test(mixer.value?.device ?? 'null');
 
 /** Lets the page sound at the user's first gesture, unless the daemon sounds itself or the user said no. */
-export function soundByGesture(): void {
+export function soundByGesture(event?: Event): void {
+  // These buttons turn the sound on, or off again, by themselves.
+  if (event?.target instanceof Element && event.target.closest('button.sound')) return;
   if (reached.value && sceneName() && !sounding.value && !declined && !hasDevice()) sound('');
 }
 

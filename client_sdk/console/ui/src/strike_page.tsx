@@ -243,7 +243,7 @@ export function SpectrogramView({ chosen }: { chosen?: (timeS: number) => void }
     if (time !== undefined) chosen?.(time);
   };
   return <figure><figcaption>What is heard here, to 16 kHz{chosen && '; click a sound to see the blow that made it'}{sounding.value ? '' : ': nothing, '}
-    {!sounding.value && <button class="inline" onClick={() => sound('')}>hear the daemon in this browser</button>}</figcaption>
+    {!sounding.value && <button class="inline sound" onClick={() => sound('')}>hear the daemon in this browser</button>}</figcaption>
     <canvas ref={canvas} class="spectrogram" onClick={choose} aria-hidden="true" /></figure>;
 }
 
