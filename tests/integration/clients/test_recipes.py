@@ -30,8 +30,8 @@ class RecipesTest(DaemonTest):
         cls.environment = {**os.environ, "CARILLON_SERVER": cls.daemon.server, "LD_LIBRARY_PATH": str(cls.library),
                            "PYTHONPATH": str(BUILD / "client_sdk/python")}
 
-    def save(self, page, language, name):
-        program = re.search(rf"(?ms)^```{language}\n(.*?)^```", (ROOT / "docs" / page).read_text())[1]
+    def save(self, page, language, name, number=0):
+        program = re.findall(rf"(?ms)^```{language}\n(.*?)^```", (ROOT / "docs" / page).read_text())[number]
         self.assertLessEqual(program.count("\n"), MOST_LINES)
         (self.folder / name).write_text(program)
         return name
@@ -70,9 +70,9 @@ class RecipesTest(DaemonTest):
                      f"-L{self.library}", "-lcarillon")
         self.hear_the_bar("./fall_unreal")
 
-    def run_python(self, page):
-        """Runs the program of the page, and returns what it prints."""
-        name = self.save(page, "python", f"{page}.py")
+    def run_python(self, page, number=0):
+        """Runs a program of the page, and returns what it prints."""
+        name = self.save(page, "python", f"{page}.{number}.py", number)
         done = subprocess.run(["/usr/bin/python3", name], cwd=self.folder, env=self.environment, check=False,
                               capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
@@ -107,6 +107,22 @@ class RecipesTest(DaemonTest):
         for key in {key for _, key, _ in regions}:
             self.assertLess(treble[key, "1"], treble[key, "48"])
             self.assertLess(treble[key, "48"], treble[key, "96"])
+
+    def test_partials(self):
+        printed = self.run_python("recipe_sampler.md", number=1)
+        self.assertLess(float(re.fullmatch(r"left over: (-\d+) dB\n", printed)[1]), -40)
+        table = numpy.genfromtxt(self.folder / "bar.csv", delimiter=",", names=True)
+        with carillon.connect(self.daemon.server) as c:
+            (bar,) = (model for model in c.models() if model.material.preset == "brass")
+            strike = {"point": (0.1, 0.015, 0.008), "impulse": (0, 0, -0.2), "duration": 0.0005, "seconds": 0.3}
+            gain = 0.1 / bar.render_strike(**strike, gain=0.01).peak * 0.01
+            struck = bar.render_strike(**strike, gain=gain)
+        heard_pa = struck.mono * struck.summary.peak_pa / struck.peak / gain
+        times_s = (numpy.arange(len(heard_pa)) - numpy.flatnonzero(heard_pa)[0])[:, numpy.newaxis] / 48000
+        waves = numpy.cos(2 * numpy.pi * table["frequency_hz"] * times_s + table["phase_rad"])
+        made_pa = (table["amplitude_pa"] * waves * 10 ** (-3 * times_s / table["t60_s"])).sum(axis=1)
+        rings = slice(480, -960)  # after the contact, and before the end fades out
+        self.assertLess(numpy.std((made_pa - heard_pa)[rings]), 0.01 * numpy.std(heard_pa[rings]))
 
     def test_cracked_vase(self):
         printed = self.run_python("recipe_cracked_vase.md")
