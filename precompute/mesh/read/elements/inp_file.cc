@@ -355,7 +355,7 @@ class InpParser {
       return absl::OkStatus();
     }
     face_ = is_numbered ? face[1] - '0' : 0;
-    const absl::Status status = TakeSet({fields[0]}, name, false);
+    absl::Status status = TakeSet({fields[0]}, name, false);
     face_ = 0;
     return status;
   }
