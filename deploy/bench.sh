@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/bench.sh decomposition|engines|fit|ingest|mixer|motion|radiation
+# deploy/bench.sh console|decomposition|engines|fit|ingest|mixer|motion|radiation
 # [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
 #
 # Installs what is missing, the programs compared with too, builds, runs all of them in turn on the
