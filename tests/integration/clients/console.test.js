@@ -199,6 +199,9 @@ async function accessibilityFaults(page) {
   return page.evaluate(async () => (await globalThis.axe.run()).violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`));
 }
 
+const samplesOf = (wave) => new Float32Array(new Uint8Array(wave.subarray(44)).buffer);
+const loudestOf = (samples) => samples.reduce((most, sample) => Math.max(most, Math.abs(sample)), 0);
+
 async function keepPicture(page, name) {
   await page.screenshot({ path: path.join(pictures, name) });
   if (process.env.CARILLON_KEEP_PICTURES) fs.copyFileSync(path.join(pictures, name), path.join(process.env.CARILLON_KEEP_PICTURES, name));
@@ -278,6 +281,11 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   await page.waitForFunction(() => carillonConsole.state.model.value.shapes.get(0));
   await keepPicture(page, 'console_strike.png');
 
+  // A mode that is shown stays in sight while points of it are struck, so that its nodal lines can be.
+  await click();
+  await page.waitForFunction(() => carillonConsole.state.row.value);
+  assert.equal(await page.evaluate(() => carillonConsole.state.chosenMode.value), 0);
+
   // Another material of another Poisson's ratio sounds at once, as its speed of sound says, and the page says what is not exact.
   const lowestHz = () => page.evaluate(async () => {
     const { state } = carillonConsole;
@@ -307,6 +315,16 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   }, [modes[0], factor]);
   assert.ok(Math.abs(await page.evaluate(() => carillonConsole.state.modes.value[0].frequencyHz) / modes[0] / factor - 1) < 1e-3);
 
+  await page.getByLabel('Tune mode 1 to').fill('A4');
+  await page.getByLabel('Tune mode 1 to').press('Enter');
+  await page.waitForFunction(async () => {
+    const { objects } = await carillonConsole.state.services.scenes.listObjects({ scene: carillonConsole.state.sceneName() });
+    return Math.abs(objects[0].lowestFrequencyHz / 440 - 1) < 1e-3;
+  });
+  await page.getByLabel('Exactly').fill('0.5');
+  await page.getByLabel('Exactly').press('Enter');
+  await page.waitForFunction((lowest) => Math.abs(carillonConsole.state.modes.value[0].frequencyHz / lowest / 2 - 1) < 1e-3, modes[0]);
+
   // The keyboard alone strikes another point.
   const before = await page.evaluate(() => carillonConsole.state.strike.value.point);
   await page.locator('.body').focus();
@@ -322,8 +340,75 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Save WAV').click()]);
   const wave = fs.readFileSync(await download.path());
   assert.equal(wave.toString('latin1', 0, 4), 'RIFF');
-  assert.ok(new Float32Array(new Uint8Array(wave.subarray(44)).buffer).some((sample) => Math.abs(sample) > 1e-5));
+  assert.equal(download.suggestedFilename(), 'bar_structural_steel.wav');
+  // The sound ends 60 dB below its peak, at 0.
+  const samples = samplesOf(wave), peak = loudestOf(samples), end = loudestOf(samples.subarray(-4800));
+  assert.ok(peak > 1e-5 && end < 2e-3 * peak && samples.at(-1) === 0, `peak ${peak}, end ${end}`);
   assert.deepEqual(await accessibilityFaults(page), []);
+}));
+
+/** The amplitude of a partial about a time, through a Hann window of 0.2 s. */
+function partialAt(samples, hz, s) {
+  const length = 9600, begin = Math.round(s * 48000);
+  let re = 0, im = 0;
+  for (let i = 0; i < length; i += 1) {
+    const value = samples[begin + i] * (1 - Math.cos(2 * Math.PI * i / length));
+    re += value * Math.cos(2 * Math.PI * hz * i / 48000);
+    im += value * Math.sin(2 * Math.PI * hz * i / 48000);
+  }
+  return Math.hypot(re, im) / length;
+}
+
+test('every material of the catalogue sounds, and T60 and levels in the table are those that sound', { timeout: 400000 }, () => inBrowser(async (page) => {
+  await page.waitForFunction(() => carillonConsole.state.model.value && !carillonConsole.state.busy.value);
+  const names = await page.evaluate(() => carillonConsole.state.materials.value.map(({ name }) => name));
+  assert.ok(names.length >= 46);
+  const sounding = (name) => page.evaluate(async () => {
+    const { state } = carillonConsole;
+    await state.updateObject();
+    const { objects } = await state.services.scenes.listObjects({ scene: state.sceneName() });
+    return { hz: objects[0].lowestFrequencyHz, young: objects[0].material.youngPa / state.material.value.youngPa,
+      modes: state.modes.value.map((mode) => mode.frequencyHz) };
+  }, name);
+  for (const name of [...names, 'structural_steel']) {
+    await page.getByLabel(/^Material/).selectOption(name);
+    const { hz, young, modes } = await sounding(name);
+    assert.equal(young, 1, name);
+    // Modes that are damped too much do not sound.
+    assert.ok(modes.some((one) => Math.abs(hz / one - 1) < 1e-3), `${name}: ${hz} Hz is none of ${modes}`);
+    assert.equal(await page.locator('.fault').count(), 0, name);
+  }
+
+  const table = () => page.evaluate(() => carillonConsole.state.modes.value.map(({ frequencyHz, t60S, levelPa, moves }) =>
+    ({ frequencyHz, t60S, levelPa, moves })));
+  const ofMaterial = await table();
+  await page.getByRole('button', { name: 'Compute it' }).click();
+  await page.getByText('with the radiation into air.').waitFor();
+  const [{ radiation }] = await page.evaluate(async () => (await carillonConsole.state.services.scenes.listObjects({ scene: carillonConsole.state.sceneName() })).objects);
+  assert.equal(radiation, 2);  // RADIATION_MODEL_RADIATED_POWER
+  await page.evaluate(() => { void carillonConsole.strikeOutermost(); });
+  await page.waitForFunction(() => carillonConsole.state.row.value);
+  const modes = await table();
+  const [download] = await Promise.all([page.waitForEvent('download'), page.getByText('Save WAV').click()]);
+  const samples = samplesOf(fs.readFileSync(await download.path()));
+  const loudest = Math.max(...modes.map((mode) => mode.levelPa));
+  const alone = modes.filter((mode) => mode.levelPa > 1e-3 * loudest && mode.t60S > 0.5 && modes.every((other) => other === mode
+    || Math.abs(other.frequencyHz - mode.frequencyHz) > 40 || other.levelPa < 1e-3 * mode.levelPa));
+  const measured = alone.map((mode) => {
+    const s = Math.min(mode.t60S / 3, samples.length / 48000 - 0.25);
+    const [first, then] = [0.01, 0.01 + s].map((at) => partialAt(samples, mode.frequencyHz, at));
+    return { ...mode, measuredT60S: s * Math.log(1000) / Math.log(first / then), first, byMaterialS: ofMaterial[modes.indexOf(mode)].t60S };
+  });
+  assert.ok(measured.length >= 3);
+  for (const { frequencyHz, t60S, measuredT60S } of measured) {
+    assert.ok(Math.abs(t60S / measuredT60S - 1) < 0.05, `${frequencyHz} Hz: the table has ${t60S} s, the sound ${measuredT60S} s`);
+  }
+  assert.ok(measured.some(({ byMaterialS, measuredT60S }) => byMaterialS > 1.5 * measuredT60S));
+  // The hammer softens neighbours equally: their levels at the beginning differ as in the table.
+  const gain = ({ first, t60S, levelPa }) => 20 * Math.log10(first / levelPa) + 60 * 0.11 / t60S;
+  const steps = measured.flatMap((one) => measured.filter(({ frequencyHz }) => frequencyHz > one.frequencyHz && frequencyHz < 1.1 * one.frequencyHz)
+    .map((other) => gain(other) - gain(one)));
+  assert.ok(steps.length && steps.every((dB) => Math.abs(dB) < 1.5), `${steps} dB`);
 }));
 
 test('with less motion a mode stands still, and its nodal lines are seen without colours, too', { timeout: 400000 }, () => inBrowser(async (page) => {
@@ -365,8 +450,35 @@ test('a refused mesh is shown with the place that is wrong, and repaired by a bu
   await page.locator('input[type=file]').setInputFiles(process.env.CARILLON_TEST_OPEN);
   await page.getByText('MESH_NOT_CLOSED').or(page.getByText('open edges')).waitFor();
   assert.ok(await variance(page, '.body', 'refused.png') > 100);
+  // No other body can be struck beside it, and it is there again after another view.
+  const isAlone = async () => {
+    assert.equal(await page.evaluate(() => carillonConsole.state.model.value ?? carillonConsole.state.strike.value ?? 'none'), 'none');
+    assert.equal(await page.getByLabel('Body', { exact: true }).locator('option:checked').textContent(), 'open.obj');
+    assert.ok(await page.getByRole('button', { name: 'Strike again' }).isDisabled());
+  };
+  await isAlone();
+  await page.getByRole('link', { name: 'Models' }).click();
+  await page.locator('.models img').first().waitFor();
+  await page.getByRole('link', { name: 'Strike' }).click();
+  await page.getByText('open edges').waitFor();
+  await isAlone();
   await page.getByRole('button', { name: 'Repair it' }).click();
   await page.waitForFunction(isModelReady);
+}));
+
+test('a file of an unknown unit shows its size at once, and is asked about', { timeout: 400000 }, () => inBrowser(async (page) => {
+  const metres = fs.readFileSync(process.env.CARILLON_TEST_BAR, 'utf8');
+  const buffer = Buffer.from(metres.replace(/^v (.*)$/gm, (_, place) => `v ${place.trim().split(/\s+/).map((x) => 1000 * x).join(' ')}`));
+  await page.locator('input[type=file]').setInputFiles({ name: 'bar_mm.obj', mimeType: 'model/obj', buffer });
+  await page.locator('.sides').getByText(/^\d{3} × \d+ × \d+ m$/).waitFor();
+  const asWide = (await page.locator('.sides').textContent()).replace(' m', ' mm');
+  await page.getByRole('button', { name: 'It is in millimetres' }).click();
+  await page.waitForFunction(isModelReady);
+  assert.equal(await page.locator('.sides').textContent(), asWide);
+  const hz = await page.evaluate(() => carillonConsole.state.modes.value[0].frequencyHz);
+  assert.ok(Math.abs(hz / Number(process.env.CARILLON_TEST_BAR_HZ) - 1) < 0.02, `${hz} Hz`);
+  await page.reload();
+  assert.equal(await page.getByLabel('its unit').inputValue(), '0.001');
 }));
 
 test('a running simulator is seen, and why it is silent', { timeout: 400000 }, () => inBrowser(async (page) => {
@@ -388,6 +500,20 @@ test('a running simulator is seen, and why it is silent', { timeout: 400000 }, (
   await page.getByRole('button', { name: 'Unmute' }).press('Enter');
   await page.waitForFunction(() => carillonConsole.live.scene.value.muted === false);
   await page.waitForFunction(() => !document.querySelector('.chain .broken'));
+  // Bodies of gain 0 are why nothing is heard, too.
+  await page.evaluate(async () => {
+    for (const { name } of carillonConsole.live.objects.value) await carillonConsole.state.services.scenes.updateObject({ name, gain: 0 });
+  });
+  await page.locator('.chain .broken').getByText('The gain of every body is 0.').waitFor();
+  await page.getByRole('button', { name: 'Set them to 1' }).press('Enter');
+  await page.waitForFunction(() => !document.querySelector('.chain .broken'));
+  // The page's own scene gives way to a simulator's.
+  const theirs = await page.evaluate(() => {
+    const { live, state } = carillonConsole, was = live.sceneName.value;
+    live.sceneName.value = state.sceneName();
+    return was;
+  });
+  await page.waitForFunction((name) => carillonConsole.live.sceneName.value === name, theirs);
   // A click in the spectrogram finds the blow that is heard there, and the step that made it.
   const { played, rendered } = await page.evaluate(async () => {
     const played = carillonConsole.player.playedS();

@@ -63,9 +63,15 @@ export class BodyView {
     this.renderer.setAnimationLoop((now) => this.draw(now));
   }
 
-  /** Shows the surface of a file that is no model yet, with the places that a refusal names. */
-  preview(surface: THREE.BufferGeometry, places: [number, number, number][]): void {
+  /** Shows the surface of a file that is no model yet, if it is known, with the places that a refusal names. */
+  preview(surface: THREE.BufferGeometry | undefined, metresPerUnit: number, places: [number, number, number][]): void {
     this.clear();
+    this.dot.visible = false;
+    if (!surface) {
+      this.budget.draw(this.scene, this.camera);
+      return;
+    }
+    surface = surface.clone().scale(metresPerUnit, metresPerUnit, metresPerUnit);
     this.body = new THREE.Mesh(surface, new THREE.MeshStandardMaterial({ color: 0x9aa4ad, flatShading: true, side: THREE.DoubleSide }));
     this.scene.add(this.body);
     this.lookAt(surface);

@@ -35,7 +35,7 @@ function Chain() {
   const first = links.find((link) => link.state === 'broken');
   return <section class="chain"><h2 id="chain">{first ? 'Why nothing is heard' : 'From the simulator to the ear'}</h2>
     <ol aria-labelledby="chain">{links.map((link) => <li class={link === first ? 'broken' : link.state === 'broken' ? 'behind' : link.state}>
-      <strong>{link.name}</strong> <span>{link === first ? '✗ ' : link.state === 'well' ? '✓ ' : ''}{link.says}</span>
+      <strong>{link.name}</strong> <span>{link === first || link.state === 'faulty' ? '✗ ' : link.state === 'well' ? '✓ ' : ''}{link.says}</span>
       {link.remedy && <> <button onClick={link.remedy.act}>{link.remedy.text}</button></>}</li>)}</ol></section>;
 }
 
@@ -66,7 +66,7 @@ function Origin() {
 }
 
 function Blows() {
-  return <section class="blows"><h2>Newest blows</h2><Origin /><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
+  return <section class="blows"><h2>Newest blows</h2><Origin /><table><thead><tr><th title="on the clock of the daemon’s sound">at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
     <tbody>{live.blows.value.slice(0, 12).map((seen) => [seen, seen.blow] as const).map(([seen, blow]) => <tr>
       <td><button class="inline" onClick={() => { live.chosen.value = seen; }}>{blow.timeS.toFixed(3)}</button></td><td>{blow.object}</td>
       <td>{striker(blow)}</td>
@@ -78,8 +78,8 @@ export function LivePage() {
   const heard = heardScene.value === live.sceneName.value;
   return <main>
     <div class="left">
-      <section class="creation"><label>Scene <select value={live.sceneName.value} onChange={(event) => { live.sceneName.value = event.currentTarget.value; }}>
-        {live.scenes.value.map((scene) => <option value={scene.name}>{scene.name}, {scene.objectCount} bodies, {live.decibels(scene.peak)}
+      <section class="creation"><label>Scene <select value={live.sceneName.value} onChange={(event) => { live.chosenByHand.value = true; live.sceneName.value = event.currentTarget.value; }}>
+        {live.scenes.value.map((scene) => <option value={scene.name}>{scene.name}, {scene.objectCount} {scene.objectCount === 1 ? 'body' : 'bodies'}, {live.decibels(scene.peak)}
           {scene.name === state.sceneName() ? ' (this page)' : ''}</option>)}</select></label>
         <label class="tick"><input type="checkbox" checked={heard} onChange={(event) => void hear(event.currentTarget.checked ? live.sceneName.value : '')} /> hear this scene alone</label>
       </section>

@@ -13,6 +13,8 @@ const MOST_BLOWS = 200;
 const RUNNING_MS = 2500;
 /** What is softer is taken for silence; 16 bits end at -96 dBFS. */
 const SOFT_DB = -70;
+/** What was not struck or not heard for this long is silent now. */
+const RECENT_MS = 5000;
 
 export interface SeenBlow { blow: Blow; stream: bigint; seenMs: number }
 export interface SeenStream { report: StreamContactsResponse; seenMs: number; ended: boolean }
@@ -21,12 +23,16 @@ export interface SeenStream { report: StreamContactsResponse; seenMs: number; en
 export const watching = signal(false);
 export const scenes = signal<Scene[]>([]);
 export const sceneName = signal('');
+/** Whether the user chose the scene, so that another is not chosen for them. */
+export const chosenByHand = signal(false);
 export const objects = signal<SoundingObject[]>([]);
 export const blows = signal<SeenBlow[]>([]);
 export const streams = signal<Map<bigint, SeenStream>>(new Map());
 /** The blow whose origin is shown. */
 export const chosen = signal<SeenBlow | undefined>(undefined);
 export const lostCount = signal(0n);
+/** When the scene was last loud enough to hear, as far as the page has seen. */
+let heardMs = 0;
 
 export const scene = computed(() => scenes.value.find((one) => one.name === sceneName.value));
 
@@ -49,11 +55,15 @@ export function stepTimeOf({ blow, stream }: SeenBlow): number | undefined {
 /** A stage between a simulator and an ear. */
 export interface Link {
   name: string;
-  state: 'well' | 'broken' | 'unknown';
+  /** A faulty stage lets sound through, but not all of it. */
+  state: 'well' | 'faulty' | 'broken' | 'unknown';
   says: string;
   /** What a button beside it does. */
   remedy?: { text: string; act: () => void };
 }
+
+const isLoud = (one: Scene) => 20 * Math.log10(one.peak + 1e-9) >= SOFT_DB;
+const ago = (ms: number) => `${((Date.now() - ms) / 1000).toFixed(0)} s ago`;
 
 export const decibels = (amplitude: number) => `${(20 * Math.log10(Math.max(amplitude, 1e-9))).toFixed(0)} dBFS`.replace('-', '−');
 
@@ -75,8 +85,11 @@ function stepsOf(): Link {
   const running = [...streams.value.values()].filter((stream) => !stream.ended && Date.now() - stream.seenMs < RUNNING_MS);
   const steps = running.reduce((sum, stream) => sum + Number(stream.report.stepCount), 0);
   if (running.length) return { name: 'Contact stream', state: 'well', says: `${running.length} running, ${steps} steps` };
-  const ended = [...streams.value.values()].some((stream) => stream.ended);
-  return { name: 'Contact stream', state: 'broken', says: ended ? 'It has ended.'
+  const known = [...streams.value.values()];
+  const last = Math.max(...known.map((stream) => stream.seenMs));
+  const came = known.reduce((sum, stream) => sum + Number(stream.report.stepCount), 0);
+  return { name: 'Contact stream', state: 'broken', says: known.some((stream) => stream.ended) ? 'It has ended.'
+    : came ? `The last of ${came} steps came ${ago(last)}. The simulator is paused, or hangs.`
     : 'No step has come since this page watches. The simulator is paused, or sends to another scene.' };
 }
 
@@ -88,16 +101,27 @@ function contactsOf(): Link {
   const late = sum((report) => report.lateCount), loads = sum((report) => report.findings?.loadCount ?? 0n);
   const counts = `${taken} impulses taken (${late} late), ${rejected} rejected, ${dropped} dropped`;
   const last = [...streams.value.values()].at(-1)?.report.lastRejection;
-  if (taken) return { name: 'Contacts', state: 'well', says: last && rejected ? `${counts}. The last rejected: ${last.message}` : counts };
+  if (taken && last && rejected) return { name: 'Contacts', state: 'faulty', says: `${counts}. The last rejected: ${last.message}` };
+  if (taken) return { name: 'Contacts', state: 'well', says: counts };
   if (last && rejected) return { name: 'Contacts', state: 'broken', says: `All ${rejected} were rejected: ${last.message}` };
   if (!streams.value.size) return { name: 'Contacts', state: 'unknown', says: '' };
   return { name: 'Contacts', state: 'broken', says: loads ? 'All contacts rest, slide or roll; nothing strikes.' : 'The steps have no contacts.' };
 }
 
 function soundOf(one: Scene): Link {
-  return one.activeModeCount
-    ? { name: 'Ringing', state: 'well', says: `${one.activeModeCount} modes` }
-    : { name: 'Ringing', state: 'unknown', says: 'Nothing rings at this moment.' };
+  const name = 'Ringing', [last] = blows.value;
+  if (objects.value.length && objects.value.every((object) => object.gain === 0)) {
+    const all = objects.value.map((object) => object.name);
+    return { name, state: 'broken', says: 'The gain of every body is 0.', remedy: { text: 'Set them to 1', act: () => void state.attempt('',
+      () => Promise.all(all.map((object) => state.services.scenes.updateObject({ name: object, gain: 1 })))) } };
+  }
+  if (one.activeModeCount) return { name, state: 'well', says: `${one.activeModeCount} modes` };
+  if (!last || one.muted || one.gain === 0) return { name, state: 'unknown', says: 'Nothing rings at this moment.' };
+  if (Date.now() - last.seenMs > RECENT_MS) return { name, state: 'broken', says: `Nothing rings: the last blow was ${ago(last.seenMs)}.` };
+  if (Date.now() - heardMs < RECENT_MS) return { name, state: 'well', says: `Nothing rings at this moment; the last blow was ${ago(last.seenMs)}.` };
+  const largest = Math.max(...blows.value.filter(({ seenMs }) => Date.now() - seenMs < RECENT_MS)
+    .map(({ blow: { impulseNewtonSeconds: p } }) => Math.hypot(p?.x ?? 0, p?.y ?? 0, p?.z ?? 0)));
+  return { name, state: 'broken', says: `Blows come, but none leaves anything ringing: the largest of the last seconds has ${largest.toPrecision(2)} N s.` };
 }
 
 function volumeOf(one: Scene): Link {
@@ -109,7 +133,7 @@ function volumeOf(one: Scene): Link {
   if (solo && !one.solo) return { name, state: 'broken', says: `Only ${solo.name} is heard: it is solo.`,
     remedy: { text: 'End solo', act: () => void state.attempt('', () => state.services.scenes.updateScene({ name: solo.name, solo: false })) } };
   if (one.gain === 0) return { name, state: 'broken', says: 'Its gain is 0.', remedy: { text: 'Set it to 1', act: update({ gain: 1 }) } };
-  const soft = one.activeModeCount > 0 && 20 * Math.log10(one.peak + 1e-9) < SOFT_DB;
+  const soft = one.activeModeCount > 0 && !isLoud(one);
   return { name, state: soft ? 'broken' : 'well',
     says: soft ? `It rings, but at ${decibels(one.peak)} it is too soft to hear.` : `gain ${one.gain.toPrecision(3)}, peak ${decibels(one.peak)}`,
     remedy: soft ? { text: '20 dB louder', act: update({ gain: one.gain * 10 }) } : undefined };
@@ -128,7 +152,8 @@ function outputOf(): Link {
 function deviceOf(): Link {
   const mixer = state.mixer.value;
   const text = mixer?.deviceMessage ? `${mixer.device}: ${mixer.deviceMessage}` : mixer?.device ?? '';
-  if (hasDevice() || sounding.value) return { name: 'Daemon’s device', state: 'well', says: text };
+  if (!hasDevice() && sounding.value) return { name: 'Daemon’s device', state: 'unknown', says: `${text}; this browser plays instead` };
+  if (hasDevice()) return { name: 'Daemon’s device', state: 'well', says: text };
   return { name: 'Daemon’s device', state: 'broken', says: `${text}: it plays on no loudspeaker. Hear it in this browser instead.` };
 }
 
@@ -156,7 +181,9 @@ function likeliest(): Scene | undefined {
 
 repeat(STATE_PERIOD_MS, async () => {
   scenes.value = (await state.services.scenes.listScenes({})).scenes;
-  if (!scene.value) sceneName.value = likeliest()?.name ?? '';
+  if (scene.value && isLoud(scene.value)) heardMs = Date.now();
+  // A simulator that begins later is chosen, too, unless the user has.
+  if (!scene.value || (!chosenByHand.value && sceneName.value === state.sceneName())) sceneName.value = likeliest()?.name ?? '';
 });
 
 repeat(POSE_PERIOD_MS, async () => {
@@ -201,6 +228,7 @@ effect(() => {
   const stop = new AbortController();
   blows.value = [];
   chosen.value = undefined;
+  heardMs = 0;
   streams.value = new Map();
   void watch(name, stop.signal);
   return () => stop.abort();

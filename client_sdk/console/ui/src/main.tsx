@@ -8,7 +8,7 @@ import * as state from './state';
 import * as live from './live_state';
 import { TracePage } from './trace_page';
 import * as trace from './trace_state';
-import { audition, StrikePage, view } from './strike_page';
+import { audition, strikeOutermost, StrikePage, view } from './strike_page';
 
 const TABS = { strike: 'Strike', live: 'Live', models: 'Models', trace: 'Trace' } as const;
 const tabOf = (hash: string) => (hash.slice(1) in TABS ? hash.slice(1) as keyof typeof TABS : 'strike');
@@ -23,7 +23,7 @@ function Header() {
   const level = mixer && mixer.peak > 0 ? `${(20 * Math.log10(mixer.peak)).toFixed(0)} dBFS`.replace('-', '−') : 'silence';
   return <header><h1>Carillon</h1>
     <nav aria-label="Views">{Object.entries(TABS).map(([name, title]) => <a href={`#${name}`} aria-current={tab.value === name ? 'page' : undefined}>{title}</a>)}</nav>
-    <span>{mixer ? `${mixer.device}, load ${(100 * mixer.load).toFixed(1)} %, ${mixer.activeModeCount} modes ring, ${level}` : 'no daemon'}</span>
+    <span>{mixer ? `${hasDevice() ? mixer.device : `${mixer.device} (no loudspeaker)`}, load ${(100 * mixer.load).toFixed(1)} %, ${mixer.activeModeCount} modes ring, ${level}` : 'no daemon'}</span>
     <span>{sounding.value && player.underruns ? `${player.underruns} gaps` : ''}</span>
     <label class="volume">Volume here <input type="range" min="0" max="60" step="1" value={player.volumeDb}
       onInput={(event) => { player.volumeDb = Number(event.currentTarget.value); }} /></label>
@@ -38,4 +38,4 @@ function Page() {
 }
 
 render(<Page />, document.body);
-Object.assign(globalThis, { carillonConsole: { player, state, live, trace, view: () => view } });
+Object.assign(globalThis, { carillonConsole: { player, state, live, strikeOutermost, trace, view: () => view } });

@@ -2,12 +2,13 @@
 // A modal model in the browser: its surface, mode shapes, and what follows from them and a material.
 import type { Material } from './gen/carillon/v1/material_pb';
 import type { ModalModelHeader } from './gen/carillon/v1/modal_model_pb';
-import type { ModalModelSummary } from './gen/carillon/v1/modal_model_service_pb';
+import type { ModalModelSummary, TransferSummary } from './gen/carillon/v1/modal_model_service_pb';
 import { ElementType } from './gen/carillon/v1/modal_model_pb';
 import type { Services } from './services';
 
 const SIXTY_DB = Math.log(1000);
-const AIR_KG_PER_M3 = 1.2041;
+/** As the daemon has it: how far the speed of sound of a material may be from that of a transfer, as a difference of logarithms. */
+const SPEED_TOLERANCE = 0.05;
 
 /** Shapes that a page keeps: those of 64 modes of 100,000 vertices have 38 MB. */
 const MOST_SHAPES = 64;
@@ -88,6 +89,9 @@ export interface SoundingMode {
   t60S: number;
   /** Pressure at 1 m of an impulse, Pa, root mean square over directions. */
   levelPa: number;
+  /** The displacement of the struck point, and its part along the blow, as shares of the root mean square over the body. */
+  moves: number;
+  movesAlong: number;
 }
 
 const BYTES = { [ElementType.FLOAT32]: 4, [ElementType.FLOAT64]: 8, [ElementType.UINT32]: 4 } as Record<number, number>;
@@ -148,32 +152,45 @@ function decayOf(material: Material, omega: number): number {
   return ((material.alpha1S ?? 0) * eigenvalue + (material.alpha2PerS ?? 0)) / 2;
 }
 
+/** The transfer by which an object of the material sounds, if one is stored. */
+export function fittingTransfer({ transfers }: ModalModelSummary, material: Material): TransferSummary | undefined {
+  const speed = Math.sqrt((material.youngPa ?? 1) / (material.densityKgPerM3 ?? 1));
+  const distance = ({ header }: TransferSummary) => Math.abs(Math.log(speed / (header!.speedRatio * header!.soundSpeedMPerS)));
+  return transfers.filter((one) => one.powerIntegrals.length && distance(one) <= SPEED_TOLERANCE)
+    .sort((a, b) => distance(a) - distance(b))[0];
+}
+
 /** The modes up to 20 kHz, as an impulse (N s) at the point whose shapes are `row` excites them; without one levels are 0. */
 export function soundingModes(model: ModalModel, material: Material, size: number,
     strike?: { row: Float32Array; impulse: [number, number, number] }): SoundingMode[] {
   const density = material.densityKgPerM3 ?? 1;
   const scale = (material.youngPa ?? 1) / (density * size * size);
-  const integrals = model.summary.transfers[0]?.powerIntegrals ?? [];
+  const transfer = fittingTransfer(model.summary, material), air = transfer?.header;
+  const rootVolume = Math.sqrt(model.header.volumeM3);
   const modes: SoundingMode[] = [];
   for (let index = 0; index < model.modeCount; index += 1) {
     const omega = Math.sqrt(model.eigenvalues[index]! * scale);
     if (omega > 2 * Math.PI * 20000) break;
-    const decayPerS = decayOf(material, omega);
-    let levelPa = 0;
+    const integral = transfer?.powerIntegrals[index] ?? 0;
+    // transfer.proto has the formulas of the radiated power.
+    const decayPerS = decayOf(material, omega)
+      + (air ? air.airDensityKgPerM3 * omega * omega * size * integral / (2 * air.soundSpeedMPerS * density) : 0);
+    let levelPa = 0, moves = 0, movesAlong = 0;
     if (strike) {
       let force = 0;
       for (let axis = 0; axis < 3; axis += 1) {
         force += strike.impulse[axis]! * strike.row[3 * index + axis]!;
       }
+      moves = rootVolume * Math.hypot(...strike.row.subarray(3 * index, 3 * index + 3));
+      movesAlong = rootVolume * Math.abs(force) / Math.hypot(...strike.impulse);
       const amplitude = Math.abs(force) / Math.sqrt(density * size ** 3) / omega;
       // Without a transfer the paper's coupling takes its place, by its level in docs/physics.md.
-      const integral = integrals[index] ?? 0;
-      levelPa = integral > 0
-        ? AIR_KG_PER_M3 * omega * omega * Math.sqrt(integral * size / (4 * Math.PI * density)) * amplitude
+      levelPa = air
+        ? air.airDensityKgPerM3 * omega * omega * Math.sqrt(integral * size / (4 * Math.PI * density)) * amplitude
         : 602 * Math.abs(model.couplings[index]!) * Math.sqrt(material.youngPa ?? 1) / density / Math.sqrt(size) * amplitude;
     }
     modes.push({ index, frequencyHz: omega / (2 * Math.PI), error: model.header.estimatedErrors[index] ?? 0, decayPerS,
-      t60S: SIXTY_DB / decayPerS, levelPa });
+      t60S: SIXTY_DB / decayPerS, levelPa, moves, movesAlong });
   }
   return modes;
 }
@@ -185,8 +202,16 @@ export function lowestHz(model: ModalModel, material: Material, size: number): n
 
 const NOTES = ['C', 'C#', 'D', 'D#', 'E', 'F', 'F#', 'G', 'G#', 'A', 'A#', 'B'];
 
-/** The nearest note and the cents from it: 'A4 +3'. */
+/** The frequency that 'A4', 'C#5' or '440' names, Hz. */
+export function hzOf(text: string): number | undefined {
+  const [, letter, octave] = /^([A-G]#?)(\d)$/.exec(text.trim().toUpperCase()) ?? [];
+  const hz = letter ? 440 * 2 ** ((NOTES.indexOf(letter) + 12 * (Number(octave) + 1) - 69) / 12) : Number(text);
+  return hz > 0 ? hz : undefined;
+}
+
+/** The nearest note and the cents from it: 'A4 +3'; empty for what is too low to be one. */
 export function noteOf(frequencyHz: number): string {
+  if (frequencyHz < 16) return '';
   const number = 69 + 12 * Math.log2(frequencyHz / 440);
   const nearest = Math.round(number);
   const cents = Math.round(100 * (number - nearest));

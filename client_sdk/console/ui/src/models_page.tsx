@@ -1,23 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 import { signal } from '@preact/signals';
 import { useEffect, useRef } from 'preact/hooks';
-import type { Job } from './gen/carillon/v1/decomposition_pb';
 import { JobKind, JobState, Phase } from './gen/carillon/v1/decomposition_pb';
 import type { ModalModelSummary } from './gen/carillon/v1/modal_model_service_pb';
 import { lowestHz, noteOf, fetchModel } from './modal_model';
 import * as state from './state';
 import { drawThumbnail } from './thumbnail';
 
-const RETRY_MS = 1000;
-const MOST_JOBS = 50;
 const text = signal('');
 const tag = signal('');
 const pointed = signal(0);
-const jobs = signal<Map<string, Job>>(new Map());
 /** Pictures and lowest notes by the model's name and revision. */
 const pictures = signal<Map<string, { picture: string; note: string }>>(new Map());
 let drawing = Promise.resolve();
 
+const madeAt = (model: ModalModelSummary) => new Date(Number(model.createdUnixMs)).toISOString().slice(0, 16).replace('T', ' ');
 const keyOf = (model: ModalModelSummary) => `${model.name}/${model.revision}`;
 
 /** Draws one picture after the other, of those that have been looked at. */
@@ -44,14 +41,14 @@ function Row({ model, index, audition }: { model: ModalModelSummary; index: numb
   const change = (what: string, work: () => Promise<unknown>) => () => void state.attempt(what, work).then(state.listModels);
   return <tr ref={row} id={`model-${index}`} aria-selected={pointed.value === index} onClick={() => { pointed.value = index; }}>
     <td>{drawn?.picture && <img src={drawn.picture} alt="" width="64" height="48" />}</td>
-    <td><strong>{model.label || model.name.slice(12, 24)}</strong><br /><small>{model.tags.join(' ')}</small></td>
+    <td><strong>{state.nameOf(model)}</strong><br /><small>{model.tags.join(' ')}</small></td>
     <td>{model.header?.modeCount}</td><td>{drawn?.note}</td><td>{model.material?.preset.replaceAll('_', ' ')}</td>
-    <td>{(Number(model.storedBytes) / 1e6).toFixed(1)} MB</td><td>{new Date(Number(model.createdUnixMs)).toISOString().slice(0, 16).replace('T', ' ')}</td>
+    <td>{(Number(model.storedBytes) / 1e6).toFixed(1)} MB</td><td>{madeAt(model)}</td>
     <td><button onClick={() => audition(model)}>Hear</button>{' '}
       <button onClick={() => { void state.openModel(model.name); location.hash = '#strike'; }}>Open</button>{' '}
       <button aria-pressed={model.pinned} onClick={change('', () => state.services.models.updateModalModel({ name: model.name, pinned: !model.pinned }))}>
         {model.pinned ? 'Unpin' : 'Pin'}</button>{' '}
-      <button disabled={model.pinned} onClick={() => { if (confirm(`Delete ${model.label || 'this model'}?`)) change('', () => state.services.models.deleteModalModel({ name: model.name }))(); }}>Delete</button></td></tr>;
+      <button disabled={model.pinned} onClick={() => { if (confirm(`Delete ${state.nameOf(model)} of ${madeAt(model)} UTC?`)) change('', () => state.services.models.deleteModalModel({ name: model.name }))(); }}>Delete</button></td></tr>;
 }
 
 const SAYS: Partial<Record<JobState, string>> = { [JobState.QUEUED]: 'waits', [JobState.RUNNING]: 'runs', [JobState.SUCCEEDED]: 'done',
@@ -59,8 +56,8 @@ const SAYS: Partial<Record<JobState, string>> = { [JobState.QUEUED]: 'waits', [J
 
 function Jobs() {
   return <section><h2>Jobs</h2>
-    {!jobs.value.size && <p class="hint">None waits or runs.</p>}
-    {[...jobs.value.values()].reverse().map((job) => <div class="job">
+    {!state.jobs.value.size && <p class="hint">None waits or runs.</p>}
+    {[...state.jobs.value.values()].reverse().map((job) => <div class="job">
       <strong>{job.label || job.name.slice(5, 17)}</strong> {job.kind === JobKind.TRANSFER ? 'radiation' : 'modes'} {SAYS[job.state]}
       {job.state === JobState.RUNNING && <> <progress aria-label={`Progress of ${job.label}`} value={job.progress?.fraction ?? 0} /> {job.progress?.phase ? Phase[job.progress.phase]!.toLowerCase() : ''}
         {job.progress?.remainingS ? ` ${Math.ceil(job.progress.remainingS)} s left` : ''}</>}
@@ -70,33 +67,12 @@ function Jobs() {
     </div>)}</section>;
 }
 
-async function followJobs(signal: AbortSignal): Promise<void> {
-  while (!signal.aborted) {
-    try {
-      jobs.value = new Map();
-      for await (const { job } of state.services.jobs.watchJobs({}, { signal })) {
-        if (!job) continue;
-        const next = new Map(jobs.value).set(job.name, job);
-        if (next.size > MOST_JOBS) next.delete(next.keys().next().value!);
-        jobs.value = next;
-        if (job.state === JobState.SUCCEEDED) await state.listModels();
-      }
-    } catch {
-      // The daemon is away.
-    }
-    await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-  }
-}
-
 export function ModelsPage({ audition }: { audition: (model: ModalModelSummary) => void }) {
   useEffect(() => {
-    const stop = new AbortController();
-    void followJobs(stop.signal);
     void state.attempt('', state.listModels);
-    return () => stop.abort();
   }, []);
   const wanted = text.value.toLowerCase();
-  const rows = state.models.value.filter((model) => model.label.toLowerCase().includes(wanted) && (!tag.value || model.tags.includes(tag.value)));
+  const rows = state.listedModels.value.filter((model) => model.label.toLowerCase().includes(wanted) && (!tag.value || model.tags.includes(tag.value)));
   const tags = [...new Set(state.models.value.flatMap((model) => model.tags))].sort();
   const keys = (event: KeyboardEvent) => {
     const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
@@ -112,7 +88,7 @@ export function ModelsPage({ audition }: { audition: (model: ModalModelSummary) 
   return <main>
     <div class="left"><section class="creation"><label>Label <input type="search" value={text.value} onInput={(event) => { text.value = event.currentTarget.value; pointed.value = 0; }} /></label>
       <label>Tag <select value={tag.value} onChange={(event) => { tag.value = event.currentTarget.value; }}><option value="">any</option>{tags.map((one) => <option>{one}</option>)}</select></label>
-      <span class="hint">{rows.length} of {state.models.value.length}. The space bar lets you hear the chosen row.</span></section>
+      <span class="hint">{rows.length} of {state.listedModels.value.length}. The space bar lets you hear the chosen row.</span></section>
       <div class="models" tabIndex={0} onKeyDown={keys} role="region" aria-label="Models. Up and Down choose, Space strikes.">
         <table><thead><tr><th>picture</th><th>label, tags</th><th>modes</th><th>lowest</th><th>material</th><th>size</th><th>made (UTC)</th><th>actions</th></tr></thead>
           <tbody>{rows.map((model, index) => <Row model={model} index={index} audition={audition} />)}</tbody></table></div></div>

@@ -18,6 +18,9 @@ export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], k
   const bottom = height - MARGIN.bottom;
   const y = (db: number) => MARGIN.top + (bottom - MARGIN.top) * (topDb - db) / SPAN_DB;
   drawAxes(pen, x, y, topDb, width, bottom);
+  pen.beginPath();
+  pen.rect(MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, bottom - MARGIN.top);
+  pen.clip();
   pen.strokeStyle = '#c77700';
   for (const mode of kept) {
     line(pen, x(mode.frequencyHz), bottom, x(mode.frequencyHz), y(Math.max(topDb - SPAN_DB, 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9))));

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the page about one body knows, as signals, and what it asks of the daemon.
-import { computed, signal } from '@preact/signals';
+import { computed, effect, signal } from '@preact/signals';
+import { equals } from '@bufbuild/protobuf';
 import type { MessageInitShape } from '@bufbuild/protobuf';
 import type { Strike } from './body_view';
 import { ConnectError } from '@connectrpc/connect';
 import type { ErrorInfo, Remedy } from './gen/carillon/v1/error_pb';
 import type { GetMixerResponse } from './gen/carillon/v1/audio_service_pb';
 import type { Job } from './gen/carillon/v1/decomposition_pb';
-import { JobState } from './gen/carillon/v1/decomposition_pb';
+import { JobKind, JobState } from './gen/carillon/v1/decomposition_pb';
 import type { CatalogueMaterial, Material, MaterialSchema } from './gen/carillon/v1/material_pb';
+import { DecompositionSettingsSchema } from './gen/carillon/v1/modal_model_pb';
 import type { ModalModelSummary } from './gen/carillon/v1/modal_model_service_pb';
-import { fetchModel, soundingModes } from './modal_model';
+import { previewOf } from './mesh_preview';
+import type { Preview } from './mesh_preview';
+import { fetchModel, fittingTransfer, soundingModes } from './modal_model';
 import type { ModalModel } from './modal_model';
 import { servicesOf } from './services';
 import { StrikeStream } from './strike_stream';
@@ -18,6 +22,7 @@ import { Tunnel, tunnelAddress } from './tunnel';
 import { errorInfo } from './transport';
 
 const PIECE_BYTES = 1 << 20;
+const MOST_JOBS = 50;
 
 /** What is struck, and how; two of these are compared. */
 export interface Setting {
@@ -35,10 +40,21 @@ export interface Setting {
 export interface Factors { young: number; density: number; damping: number }
 export const UNCHANGED: Factors = { young: 1, density: 1, damping: 1 };
 
-/** A mesh file that is being made a model, or was refused. */
-export interface Upload { file: File; unit: number; repair: boolean; digest?: string }
+type Fault = Pick<ErrorInfo, 'message'> & { remedies?: Remedy[] };
+
+/** A mesh file that is being made a model, or was refused. Its unit in metres is 0 if nobody has said it. */
+export interface Upload { file: File; unit: number; repair: boolean; digest?: string; preview?: Preview; refusal?: Fault }
+
+/** A choice that outlives the page. */
+function remembered<T>(name: string, first: T) {
+  const choice = signal<T>(JSON.parse(localStorage.getItem(name) ?? JSON.stringify(first)));
+  effect(() => localStorage.setItem(name, JSON.stringify(choice.value)));
+  return choice;
+}
 
 export const reached = signal(false);
+export const unit = remembered('unit', 0);
+export const newMaterial = remembered('material', 'structural_steel');
 export const models = signal<ModalModelSummary[]>([]);
 export const materials = signal<CatalogueMaterial[]>([]);
 export const mixer = signal<GetMixerResponse | undefined>(undefined);
@@ -56,8 +72,12 @@ export const chosenMode = signal<number | undefined>(undefined);
 export const kept = signal<Setting | undefined>(undefined);
 export const upload = signal<Upload | undefined>(undefined);
 export const job = signal<Job | undefined>(undefined);
+/** The newest jobs by name. */
+export const jobs = signal<Map<string, Job>>(new Map());
+/** Counts the transfers that have come for models that are open. */
+const transferCount = signal(0);
 export const busy = signal('');
-export const fault = signal<Pick<ErrorInfo, 'message'> & { remedies?: Remedy[] } | undefined>(undefined);
+export const fault = signal<Fault | undefined>(undefined);
 
 export const material = computed<Material | undefined>(() => {
   const found = materials.value.find((entry) => entry.name === materialName.value)?.material;
@@ -71,13 +91,43 @@ function changed(of: Material, by: Factors): Material {
 }
 
 export const modes = computed(() => {
+  transferCount.value;
   if (!model.value || !material.value) return [];
   const at = strike.value && row.value && { row: row.value, impulse: force(strike.value) };
   return soundingModes(model.value, material.value, size.value, at);
 });
 
+/** Whether the levels and the decays of the modes are those of a transfer, or the job that computes it. */
+export const radiation = computed<'included' | 'absent' | Job>(() => {
+  transferCount.value;
+  const of = model.value;
+  if (of && material.value && fittingTransfer(of.summary, material.value)) return 'included';
+  return [...jobs.value.values()].find((one) => one.kind === JobKind.TRANSFER && one.modalModel === of?.name
+    && (one.state === JobState.QUEUED || one.state === JobState.RUNNING)) ?? 'absent';
+});
+
+/** Asks for the radiation of the body that is open, in its material. */
+export async function computeRadiation(): Promise<void> {
+  await attempt('', () => services.models.createTransfer({ modalModel: model.value!.name, material: materialOfObject(),
+    size: size.value, label: `${nameOf(model.value!.summary)} (transfer)` }));
+}
+
+/** The sides of the box around the body that is drawn, m. */
+export const sidesM = computed<Triple | undefined>(() => {
+  if (upload.value?.preview) return upload.value.preview.sides.map((side) => side * (upload.value!.unit || 1)) as Triple;
+  const of = model.value?.vertices;
+  if (!of) return undefined;
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < of.length; i += 1) {
+    low[i % 3] = Math.min(low[i % 3]!, of[i]!);
+    high[i % 3] = Math.max(high[i % 3]!, of[i]!);
+  }
+  return high.map((side, axis) => (side - low[axis]!) * size.value) as Triple;
+});
+
 /** The modes of the setting that was kept for comparison. */
 export const keptModes = computed(() => {
+  transferCount.value;
   const one = kept.value;
   const found = one && materials.value.find((entry) => entry.name === one.materialName)?.material;
   if (!one || !found) return [];
@@ -109,13 +159,15 @@ let updateAgain = false;
 /** The name of the page's own scene. */
 export const sceneName = () => scene;
 
+const faultOf = (error: unknown): Fault => errorInfo(error) ?? { message: ConnectError.from(error).rawMessage };
+
 export async function attempt<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
   busy.value = what;
   fault.value = undefined;
   try {
     return await work();
   } catch (error) {
-    fault.value = errorInfo(error) ?? { message: ConnectError.from(error).rawMessage };
+    fault.value = faultOf(error);
     return undefined;
   } finally {
     busy.value = '';
@@ -134,7 +186,7 @@ async function begin(): Promise<void> {
       object = '';
       strikes = new StrikeStream(services, scene, (message) => { fault.value = { message }; }, () => void begin());
       if (model.value) await addObject(model.value);
-      else if (models.value[0]) await openModel(models.value[0].name);
+      else if (models.value[0] && !upload.value) await openModel(models.value[0].name);
       return true;
     });
     if (done) break;
@@ -147,9 +199,41 @@ export async function listModels(): Promise<void> {
   models.value = (await services.models.listModalModels({ pageSize: 200 })).modalModels;
 }
 
-export async function openModel(name: string, anew = true): Promise<void> {
+const COARSE = ' (coarse)';
+
+/** The models that a list shows: without the coarse ones whose fine ones are there, too. */
+export const listedModels = computed(() => models.value.filter((one) => !one.label.endsWith(COARSE)
+  || !models.value.some((fine) => fine.label + COARSE === one.label && fine.header?.meshDigest === one.header?.meshDigest)));
+
+/** A model's label; a coarse model that stands under the name of a finer one, which was never computed, says so. */
+export function nameOf(one: ModalModelSummary): string {
+  const label = one.label || one.name.slice(12, 24);
+  const isCoarse = models.value.some((other) => other.label === label + COARSE && other.header?.meshDigest === one.header?.meshDigest
+    && other.header?.settings && one.header?.settings && equals(DecompositionSettingsSchema, other.header.settings, one.header.settings));
+  return isCoarse ? label + COARSE : label;
+}
+
+let creation = new AbortController();
+let opening = {};
+
+/** Forgets a file that is being made a model: its job goes on, and the list of jobs shows it. */
+function leaveUpload(): void {
+  creation.abort();
+  opening = {};
+  upload.value = job.value = undefined;
+}
+
+/** Opens a stored model in place of what is on the page. */
+export async function openModel(name: string): Promise<void> {
+  leaveUpload();
+  await open(name);
+}
+
+async function open(name: string, anew = true): Promise<void> {
+  const mine = opening = {};
   await attempt('fetching the model', async () => {
     const fetched = await fetchModel(services, name);
+    if (opening !== mine) return;
     if (anew) {
       materialName.value = fetched.summary.material?.preset || materialName.value || 'structural_steel';
       factors.value = UNCHANGED;
@@ -202,6 +286,7 @@ async function addObject(of: ModalModel): Promise<void> {
 /** Takes the material and the size over; at most one change is on the way, and the newest follows it. */
 export function updateObject(): Promise<void> {
   if (updating) { updateAgain = true; return updating; }
+  if (!model.value) return Promise.resolve();
   updating = (async () => {
     do {
       updateAgain = false;
@@ -266,44 +351,83 @@ async function* pieces(file: File) {
 
 const formatOf = (file: File) => file.name.split('.').pop()!.toLowerCase();
 
-/** Uploads a mesh file, has it decomposed, and opens the model as soon as it can be struck. */
+/** Uploads a mesh file, has it decomposed, and opens the model as soon as it can be struck; until then no other body is on the page. */
 export async function createModel(wanted: Upload): Promise<void> {
-  upload.value = wanted;
-  await attempt(`uploading ${wanted.file.name}`, async () => {
+  leaveUpload();
+  const { signal: left } = creation = new AbortController();
+  const tell = (change: Partial<Upload>) => { if (!left.aborted) upload.value = { ...upload.value!, ...change }; };
+  model.value = strike.value = row.value = chosenMode.value = fault.value = undefined;
+  materialName.value = newMaterial.value;
+  factors.value = UNCHANGED;
+  size.value = 1;
+  coarse.value = false;
+  upload.value = { ...wanted, refusal: undefined };
+  try {
+    tell({ preview: await previewOf(wanted.file) });
     const meshDigest = wanted.digest ?? (await services.models.uploadMesh(pieces(wanted.file))).meshDigest;
-    upload.value = { ...wanted, digest: meshDigest };
+    tell({ digest: meshDigest });
     const created = await services.models.createModalModel({ meshDigest, coarseFirst: true,
       label: wanted.file.name.replace(/\.[^.]*$/, ''), meshFormat: formatOf(wanted.file),
-      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } },
-      material: { preset: materialName.value || 'structural_steel' } });
-    await follow(created.job!);
-  });
+      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } }, material: { preset: newMaterial.value } });
+    if (!left.aborted) await follow(created.job!, left, tell);
+  } catch (error) {
+    tell({ refusal: faultOf(error) });
+  }
 }
 
-async function follow(begun: Job): Promise<void> {
+async function follow(begun: Job, left: AbortSignal, tell: (change: Partial<Upload>) => void): Promise<void> {
   let now = begun;
   let opened = false;
   try {
-    for await (const { job: news } of services.jobs.watchJob({ name: now.name })) {
+    for await (const { job: news } of services.jobs.watchJob({ name: now.name }, { signal: left })) {
+      if (left.aborted) return;
       job.value = now = news!;
       if (now.coarseReady && !opened) {
         opened = true;
-        await openModel(now.modalModel);
-        coarse.value = true;
+        await open(now.modalModel);
+        if (!left.aborted) coarse.value = true;
       }
     }
   } finally {
-    job.value = undefined;
+    if (!left.aborted) job.value = undefined;
   }
-  if (now.state !== JobState.SUCCEEDED) {
-    fault.value = now.error ?? { message: 'the job was cancelled' };
-    return;
-  }
+  if (left.aborted) return;
   await listModels();
-  await openModel(now.modalModel, !opened);
-  coarse.value = false;
-  upload.value = undefined;
+  if (now.state === JobState.SUCCEEDED) {
+    await open(now.modalModel, !opened);
+    if (left.aborted) return;
+    coarse.value = false;
+    upload.value = undefined;
+  } else if (now.state === JobState.CANCELLED) upload.value = undefined;
+  else tell({ refusal: now.error ?? { message: 'the job failed' } });
 }
+
+/** Keeps `jobs`, and what jobs bring, up to date as long as the page lives. */
+async function followJobs(): Promise<void> {
+  for (;;) {
+    try {
+      jobs.value = new Map();
+      for await (const { job: news } of services.jobs.watchJobs({})) if (news) await take(news);
+    } catch {
+      // The daemon is away.
+    }
+    await new Promise((resolve) => setTimeout(resolve, 1000));
+  }
+}
+
+async function take(news: Job): Promise<void> {
+  const next = new Map(jobs.value).set(news.name, news);
+  if (next.size > MOST_JOBS) next.delete(next.keys().next().value!);
+  jobs.value = next;
+  if (news.state !== JobState.SUCCEEDED) return;
+  await listModels();
+  for (const shown of new Set([model.value, kept.value?.model])) {
+    if (news.kind !== JobKind.TRANSFER || shown?.name !== news.modalModel) continue;
+    shown.summary.transfers = (await services.models.getModalModel({ name: shown.name })).modalModel!.transfers;
+    transferCount.value += 1;
+  }
+}
+void followJobs();
 
 setInterval(async () => {
   if (reached.value) mixer.value = await services.audio.getMixer({}).catch(() => undefined);

@@ -3,9 +3,9 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import { effect } from '@preact/signals';
 import { BodyView } from './body_view';
 import type { Strike } from './body_view';
-import { Phase } from './gen/carillon/v1/decomposition_pb';
-import { placesIn, previewOf } from './mesh_preview';
-import { lowestHz, noteOf } from './modal_model';
+import { JobState, Phase } from './gen/carillon/v1/decomposition_pb';
+import { inUnitOf, placesIn } from './mesh_preview';
+import { hzOf, lowestHz, noteOf } from './modal_model';
 import type { SoundingMode } from './modal_model';
 import { player, playerChanged, sound, soundByGesture, soundReady, sounding } from './sounding';
 import { drawSpectrum, modeAt, Spectrogram } from './spectrum';
@@ -13,9 +13,11 @@ import * as state from './state';
 import { saveStrike } from './wave_file';
 
 const STRIKERS = ['steel', 'wood', 'rubber', 'felt', 'fingertip'];
-const UNITS: [string, number][] = [['m', 1], ['cm', 0.01], ['mm', 0.001], ['inch', 0.0254]];
-/** A mode so far below the loudest is not heard at a point. */
-const SILENT_DB = -40;
+const UNITS: [string, number][] = [['not said', 0], ['m', 1], ['cm', 0.01], ['mm', 0.001], ['inch', 0.0254]];
+/** What moves less than this share of the body's root mean square is a node. */
+const NODE = 0.03;
+/** The keys of a slider strike once, after the last of them. */
+const LET_GO_MS = 300;
 export let view: BodyView | undefined;
 
 function Body() {
@@ -32,11 +34,7 @@ function Body() {
 /** Shows the file that is being made a model, until there is one, and where a refusal says it is wrong. */
 function showUpload(): void {
   const upload = state.upload.value;
-  const places = placesIn(state.fault.value?.message ?? '');
-  if (!upload || state.job.value?.coarseReady) return;
-  void previewOf(upload.file, upload.unit).then((surface) => {
-    if (surface && state.upload.value?.file === upload.file && !state.coarse.value) view?.preview(surface, places);
-  });
+  if (!state.model.value) view?.preview(upload?.preview?.surface, upload?.unit || 1, placesIn(upload?.refusal?.message ?? ''));
 }
 
 async function strikeAndShow(at: Strike): Promise<void> {
@@ -44,9 +42,10 @@ async function strikeAndShow(at: Strike): Promise<void> {
   await soundReady();
   state.sendStrike(at);
   state.strike.value = at;
-  state.chosenMode.value = undefined;
+  view?.mark(at);
   const row = await state.readRow(at);
-  if (row) await view?.showStrike(at, row, state.modes.value);
+  // A mode that was chosen stays in sight, so that its nodal lines can be struck.
+  if (row && state.chosenMode.value === undefined) await view?.showStrike(at, row, state.modes.value);
 }
 
 export function strikeAgain(): void {
@@ -56,7 +55,10 @@ export function strikeAgain(): void {
 /** Opens a model and strikes it where it sticks out most, which rings loudly for most bodies. */
 export async function audition({ name }: { name: string }): Promise<void> {
   if (state.model.value?.name !== name) await state.openModel(name);
-  const at = state.strike.value ?? view?.outermost();
+  await strikeOutermost(state.strike.value);
+}
+
+export async function strikeOutermost(at = view?.outermost()): Promise<void> {
   if (at) await strikeAndShow(at);
 }
 
@@ -84,17 +86,26 @@ function keyOnBody(event: KeyboardEvent) {
 
 function Spectrum() {
   const canvas = useRef<HTMLCanvasElement>(null);
-  useEffect(() => effect(() => drawSpectrum(canvas.current!, state.modes.value, state.keptModes.value, state.chosenMode.value)), []);
+  useEffect(() => {
+    const draw = () => drawSpectrum(canvas.current!, state.modes.value, state.keptModes.value, state.chosenMode.value);
+    new ResizeObserver(draw).observe(canvas.current!);
+    return effect(draw);
+  }, []);
   const choose = (event: MouseEvent) => {
     const mode = modeAt(canvas.current!, state.modes.value, event.offsetX);
     if (mode) chooseMode(mode.index);
   };
-  return <figure><figcaption>Modes at this point: dB above 20 µPa in air at 1 m, before the hammer softens them; the error lies
-    to the left{state.kept.value ? '; A in orange' : ''}</figcaption>
+  return <figure><figcaption>Modes at this point: dB above 20 µPa in air at 1 m, before the hammer softens them; a line to the
+    left is how far a mode may lie below{state.kept.value ? '; A in orange' : ''}</figcaption>
     <canvas ref={canvas} class="spectrum" onClick={choose} aria-hidden="true" /></figure>;
 }
 
 function chooseMode(index: number) {
+  if (state.chosenMode.value === index) {
+    state.chosenMode.value = undefined;
+    if (state.strike.value && state.row.value) void view?.showStrike(state.strike.value, state.row.value, state.modes.value);
+    return;
+  }
   state.chosenMode.value = index;
   const mode = state.modes.value.find((one) => one.index === index);
   if (mode) void view?.showMode(mode);
@@ -111,29 +122,52 @@ function Modes() {
     if (!step) return;
     event.preventDefault();
     const next = Math.max(0, Math.min(state.modes.value.length - 1, (state.chosenMode.value ?? -step) + step));
-    chooseMode(next);
+    if (next !== state.chosenMode.value) chooseMode(next);
     document.getElementById(`mode-${next}`)?.scrollIntoView({ block: 'nearest' });
   };
   const chosen = state.chosenMode.value;
   const loudest = Math.max(...state.modes.value.map((mode) => mode.levelPa));
-  const here = (mode: SoundingMode) => (loudest > 0 ? levelHere(mode, loudest) : undefined);
-  const text = (db: number | undefined) => (db === undefined ? '' : db < SILENT_DB ? 'silent' : `${db.toFixed(0)} dB`.replace('-', '−'));
-  return <section class="modes"><h2 id="modes">Modes {state.coarse.value ? '(coarse, finer ones follow)' : ''}</h2>
-    <p class="columns" aria-hidden="true"><span>#</span><span>Hz</span><span>note</span><span>−%</span><span>T60 s</span><span>here</span></p>
+  const here = (mode: SoundingMode) => {
+    if (!state.row.value) return '';
+    if (mode.moves < NODE) return 'silent';
+    if (mode.movesAlong < NODE) return 'across';
+    const db = levelHere(mode, loudest);
+    return db < -99 ? '< −99' : `${db.toFixed(0)} dB`.replace('-', '−');
+  };
+  const seconds = (s: number) => (s < 10 ? s.toPrecision(2) : s.toFixed(0));
+  return <section class="modes"><h2 id="modes">Modes {state.coarse.value ? (state.job.value ? '(coarse, finer ones follow)' : '(coarse)') : ''}</h2><Radiation />
+    <p class="columns" aria-hidden="true"><span>#</span><span>Hz</span><span>note</span><span title="how far the true frequency may lie below">low %</span><span>T60 s</span>
+      <span title="below the loudest; silent: a node; across: the point moves across the blow">here</span></p>
     <ul role="listbox" aria-labelledby="modes" tabIndex={0} onKeyDown={keys}
       aria-activedescendant={chosen === undefined ? undefined : `mode-${chosen}`}>
       {state.modes.value.map((mode) => <li role="option" id={`mode-${mode.index}`} aria-selected={mode.index === chosen}
-        class={(here(mode) ?? 0) < SILENT_DB ? 'silent' : ''} onClick={() => chooseMode(mode.index)}>
+        class={/[a-z]$/.test(here(mode)) ? 'silent' : ''} onClick={() => chooseMode(mode.index)}>
         <span>{mode.index + 1}</span><span>{mode.frequencyHz.toFixed(1)}</span><span>{noteOf(mode.frequencyHz)}</span>
-        <span>{mode.error > 0.3 ? '> 30' : (100 * mode.error).toFixed(2)}</span><span>{mode.t60S.toPrecision(2)}</span>
-        <span>{text(here(mode))}</span></li>)}
+        <span>{mode.error > 0.3 ? '> 30' : (100 * mode.error).toFixed(2)}</span><span>{seconds(mode.t60S)}</span>
+        <span>{here(mode)}</span></li>)}
     </ul></section>;
+}
+
+/** Whether the table has the radiation into air, which comes some time after a model. */
+function Radiation() {
+  const radiation = state.radiation.value;
+  if (!state.model.value) return null;
+  if (radiation === 'included') return <p class="hint" role="status">Levels and T60 with the radiation into air.</p>;
+  return <p class="hint" role="status">T60 by the material alone, levels by a rule of thumb: the radiation into air {radiation === 'absent'
+    ? <>is not known for this material. <button class="inline" onClick={() => void state.computeRadiation()}>Compute it</button></>
+    : `is being computed${radiation.progress?.remainingS ? `, ${Math.ceil(radiation.progress.remainingS)} s left` : ''}.`}</p>;
+}
+
+let letGo = 0;
+function updateAndStrike(): void {
+  clearTimeout(letGo);
+  letGo = setTimeout(() => void state.updateObject().then(strikeAgain), LET_GO_MS);
 }
 
 function Slider({ label, value, range, set }: { label: string; value: number; range: [number, number]; set: (value: number) => void }) {
   return <label>{label} <input type="range" min={range[0]} max={range[1]} step="0.01" value={Math.log10(value)}
     onInput={(event) => set(10 ** Number(event.currentTarget.value))}
-    onChange={() => void state.updateObject().then(strikeAgain)} /></label>;
+    onChange={updateAndStrike} /></label>;
 }
 
 function MaterialChoice() {
@@ -142,6 +176,8 @@ function MaterialChoice() {
     const material = state.materials.value.find((entry) => entry.name === name)?.material;
     return model && material ? ` · ${noteOf(lowestHz(model, material, state.size.value))}` : '';
   };
+  const [byNote, setByNote] = useState(false);
+  const hz = (entry: (typeof state.materials.value)[number]) => (byNote && model && entry.material ? lowestHz(model, entry.material, 1) : 0);
   const choose = (name: string) => {
     state.materialName.value = name;
     state.factors.value = state.UNCHANGED;
@@ -153,8 +189,9 @@ function MaterialChoice() {
   return <>
     <label>Material, with the lowest note that this body has of it <select value={state.materialName.value}
       onChange={(event) => choose(event.currentTarget.value)}>
-      {[...state.materials.value].sort((a, b) => a.name.localeCompare(b.name)).map(({ name }) =>
+      {[...state.materials.value].sort((a, b) => hz(a) - hz(b) || a.name.localeCompare(b.name)).map(({ name }) =>
         <option value={name}>{name.replaceAll('_', ' ')}{note(name)}</option>)}</select></label>
+    <label class="tick"><input type="checkbox" checked={byNote} onChange={(event) => setByNote(event.currentTarget.checked)} /> listed by note</label>
     {state.ratioError.value > 0.001 && <p class="hint">The body was computed for a material with another Poisson’s ratio; of this one,
       modes lie up to {(100 * state.ratioError.value).toFixed(1)} % elsewhere.</p>}
     <details><summary>Its figures</summary>
@@ -162,10 +199,27 @@ function MaterialChoice() {
   </>;
 }
 
+/** The size by a number, or by the note that the lowest mode is to have. */
+function ExactSize() {
+  const set = (size: number) => {
+    if (!(size > 0)) return;
+    state.size.value = size;
+    updateAndStrike();
+  };
+  const tune = (text: string) => {
+    const hz = hzOf(text), { model, material } = state;
+    if (hz && model.value && material.value) set(lowestHz(model.value, material.value, 1) / hz);
+  };
+  return <p class="exact"><label>Exactly <input type="number" min="0" step="any" value={Number(state.size.value.toFixed(5))}
+    onChange={(event) => set(Number(event.currentTarget.value))} /></label>
+    <label>Tune mode 1 to <input placeholder="A4 or 440" onChange={(event) => tune(event.currentTarget.value)} /></label></p>;
+}
+
 function Controls() {
   return <section class="controls"><h2>Strike</h2><MaterialChoice />
     <Slider label={`Size × ${state.size.value.toFixed(2)}`} value={state.size.value} range={[-0.7, 0.7]}
       set={(value) => { state.size.value = value; void state.updateObject(); }} />
+    <ExactSize />
     <label>Hammer <select value={state.striker.value}
       onChange={(event) => { state.striker.value = event.currentTarget.value; strikeAgain(); }}>
       {STRIKERS.map((name) => <option>{name}</option>)}</select></label>
@@ -180,7 +234,7 @@ function Controls() {
 }
 
 function Creation() {
-  const [unit, setUnit] = useState(1);
+  const unit = state.unit.value;
   const [repair, setRepair] = useState(false);
   const choose = (files?: FileList | null) => {
     if (files?.[0]) void state.createModel({ file: files[0], unit, repair });
@@ -192,38 +246,59 @@ function Creation() {
     addEventListener('drop', drop);
     return () => { removeEventListener('dragover', over); removeEventListener('drop', drop); };
   }, [unit, repair]);
-  const listed = state.models.value.some((one) => one.name === state.model.value?.name);
+  const open = state.model.value, models = state.listedModels.value;
+  const listed = models.some((one) => one.name === open?.name);
+  /** What tells a model from others of its name. */
+  const made = (one: (typeof models)[number]) => (models.some((other) => other !== one && other.label === one.label)
+    ? `, ${new Date(Number(one.createdUnixMs)).toLocaleString()}` : '');
   return <section class="creation">
-    <label>Body <select value={state.model.value?.name ?? ''} onChange={(event) => { state.upload.value = undefined; void state.openModel(event.currentTarget.value); }}>
-      {!listed && <option value={state.model.value?.name ?? ''}>{state.model.value?.summary.label ?? 'none yet'}</option>}
-      {state.models.value.map(({ name, label }) => <option value={name}>{label || name.slice(12, 24)}</option>)}</select></label>
+    <label>Body <select value={open?.name ?? ''} onChange={(event) => void state.openModel(event.currentTarget.value)}>
+      {!listed && <option value={open?.name ?? ''}>{open?.summary.label ?? state.upload.value?.file.name ?? 'none yet'}</option>}
+      {models.map((one) => <option value={one.name}>{state.nameOf(one)}{made(one)}</option>)}</select></label>
+    <Sides />
     <label>New: drop a mesh file anywhere, or <input type="file" onChange={(event) => choose(event.currentTarget.files)} /></label>
-    <label>its unit <select value={unit} onChange={(event) => setUnit(Number(event.currentTarget.value))}>
+    <label>its unit <select value={unit} onChange={(event) => { state.unit.value = Number(event.currentTarget.value); }}>
       {UNITS.map(([name, metres]) => <option value={metres}>{name}</option>)}</select></label>
+    <label>of <select value={state.newMaterial.value} onChange={(event) => { state.newMaterial.value = event.currentTarget.value; }}>
+      {state.materials.value.map(({ name }) => <option value={name}>{name.replaceAll('_', ' ')}</option>)}</select></label>
     <label class="tick"><input type="checkbox" checked={repair} onChange={(event) => setRepair(event.currentTarget.checked)} /> repair</label>
   </section>;
 }
 
-/** A remedy as a button, where the page knows the field. */
-function Remedies() {
-  const upload = state.upload.value;
-  const known = upload ? state.fault.value?.remedies?.filter((remedy) => remedy.field === 'settings.mesh.repair') ?? [] : [];
-  return <>{known.map((remedy) => <button title={remedy.effect} onClick={() => void state.createModel({ ...upload!, repair: true })}>Repair it</button>)}</>;
+/** The box around the body, in metres or millimetres. */
+function Sides() {
+  const sides = state.sidesM.value;
+  if (!sides) return null;
+  const [factor, unit] = Math.max(...sides) < 1 ? [1000, 'mm'] : [1, 'm'];
+  return <span class="sides">{sides.map((side) => Number((side * factor).toPrecision(3))).join(' × ')} {unit}</span>;
+}
+
+/** Why a file was refused, in its own unit, and the remedies of which the page knows the field, as buttons. */
+function Refusal({ upload }: { upload: state.Upload }) {
+  const again = (text: string, change: Partial<state.Upload>) => <button onClick={() => { state.unit.value = change.unit ?? state.unit.value; void state.createModel({ ...upload, ...change }); }}>{text}</button>;
+  const { message, remedies = [] } = upload.refusal!;
+  const unit = UNITS.find(([, metres]) => metres === upload.unit)![0];
+  return <p class="fault" role="alert">{upload.unit && upload.unit !== 1 ? inUnitOf(upload.unit, unit, message) : message}{' '}
+    {remedies.map(({ field, value }) => field === 'settings.mesh.repair' ? again('Repair it', { repair: true })
+      : field === 'settings.metres_per_unit' && Number(value) > 0 ? again(Number(value) === 1 ? 'It is in metres' : 'It is in millimetres', { unit: Number(value) })
+        : null)}</p>;
 }
 
 function News() {
-  const job = state.job.value;
+  const job = state.job.value, upload = state.upload.value;
   const progress = job?.progress;
   const place = state.strike.value?.point.map((metres) => (1000 * metres * state.size.value).toFixed(1)).join(', ');
   return <div class="news" role="status">
-    {job && <p><progress aria-label="Progress" value={progress?.fraction ?? 0} /> {progress?.phase ? Phase[progress.phase]!.toLowerCase() : 'waiting'}
+    {job && <p><progress aria-label="Progress" value={progress?.fraction ?? 0} /> {progress?.phase ? Phase[progress.phase]!.toLowerCase() : job.wait?.runningJobLabel ? `waiting for ${job.wait.runningJobLabel}` : 'waiting'}
       {progress?.remainingS ? `, ${Math.ceil(progress.remainingS)} s left` : ''}
       {progress?.convergedModeCount ? `, ${progress.convergedModeCount} modes` : ''}{state.coarse.value ? '; strike the coarse body now' : ''}
       {' '}<button onClick={() => void state.services.jobs.cancelJob({ name: job.name })}>Cancel</button></p>}
     {!job && state.busy.value && <p>{state.busy.value} …</p>}
-    {state.fault.value && <p class="fault" role="alert">{state.fault.value.message} <Remedies /></p>}
+    {state.fault.value && <p class="fault" role="alert">{state.fault.value.message}</p>}
+    {upload?.refusal && <Refusal upload={upload} />}
     {!state.reached.value && <p class="fault">The console is not reached; it is tried again.</p>}
-    {!job && !state.busy.value && !state.fault.value && <p>{place ? `Point ${place} mm` : state.model.value ? 'Click a point of the body to hear it.' : 'Drop a mesh file anywhere.'}</p>}
+    {upload && !job && !upload.refusal && <p>uploading {upload.file.name} …</p>}
+    {!job && !state.busy.value && !state.fault.value && !upload && <p>{place ? `Point ${place} mm` : state.model.value ? 'Click a point of the body to hear it.' : 'Drop a mesh file anywhere.'}</p>}
   </div>;
 }
 
