@@ -453,7 +453,7 @@ test('a refused mesh is shown with the place that is wrong, and repaired by a bu
   // No other body can be struck beside it, and it is there again after another view.
   const isAlone = async () => {
     assert.equal(await page.evaluate(() => carillonConsole.state.model.value ?? carillonConsole.state.strike.value ?? 'none'), 'none');
-    assert.equal(await page.getByLabel('Body', { exact: true }).locator('option:checked').textContent(), 'open.obj');
+    assert.equal(await page.locator('.creation select').first().locator('option:checked').textContent(), 'open.obj');
     assert.ok(await page.getByRole('button', { name: 'Strike again' }).isDisabled());
   };
   await isAlone();
