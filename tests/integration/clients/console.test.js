@@ -532,6 +532,22 @@ test('a running simulator is seen, and why it is silent', { timeout: 400000 }, (
   assert.match(await origin.textContent(), /on body [123], point .* mm .*, 0\.020 N s, from the step at about -?\d+\.\d+ s/);
   await keepPicture(page, 'console_live.png');
   assert.deepEqual(await accessibilityFaults(page), []);
+  // A contact that is rejected among others that sound is red, with its reason, and is not why nothing is heard.
+  await page.evaluate(async () => {
+    const { live, state } = carillonConsole;
+    live.watching.value = true;
+    async function* steps() {
+      yield { start: { scene: live.sceneName.value, stepS: 0.01 } };
+      for (let step = 0; !globalThis.seen; step += 1) {
+        yield { steps: [{ timeS: 0.5 * step, contacts: [{ kind: 2, object: 99, location: { case: 'pointM', value: { x: 0, y: 0, z: 0 } },
+          action: { case: 'impulseNewtonSeconds', value: { x: 0, y: 0, z: 1 } } }] }] };
+        await new Promise((resolve) => { setTimeout(resolve, 500); });
+      }
+    }
+    void (async () => { for await (const report of state.services.contacts.streamContacts(steps())) void report; })();
+  });
+  await page.locator('.chain .faulty').getByText(/[1-9]\d* rejected.*The last rejected: ./).waitFor();
+  await page.evaluate(() => { globalThis.seen = true; });
 }));
 
 test('the models are listed with their pictures, and the space bar lets one be heard', { timeout: 400000 }, () => inBrowser(async (page) => {

@@ -100,7 +100,7 @@ function contactsOf(): Link {
   const rejected = sum((report) => report.rejectedCount), dropped = sum((report) => report.droppedCount);
   const late = sum((report) => report.lateCount), loads = sum((report) => report.findings?.loadCount ?? 0n);
   const counts = `${taken} impulses taken (${late} late), ${rejected} rejected, ${dropped} dropped`;
-  const last = [...streams.value.values()].at(-1)?.report.lastRejection;
+  const last = [...streams.value.values()].findLast((stream) => stream.report.lastRejection)?.report.lastRejection;
   if (taken && last && rejected) return { name: 'Contacts', state: 'faulty', says: `${counts}. The last rejected: ${last.message}` };
   if (taken) return { name: 'Contacts', state: 'well', says: counts };
   if (last && rejected) return { name: 'Contacts', state: 'broken', says: `All ${rejected} were rejected: ${last.message}` };
