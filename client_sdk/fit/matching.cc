@@ -2,6 +2,7 @@
 #include "client_sdk/fit/matching.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -16,8 +17,10 @@ constexpr double kPriorNu = 0.28, kPriorNuError = 0.10;
 constexpr double kLeastNu = 0.0, kMostNu = 0.48, kNuStep = 0.02;
 /// In the logarithm of the speed.
 constexpr double kSpeedStep = 0.002;
-/// Relative scatter of the lines about the model, that of the wide tail, and the tail's part.
-constexpr double kScatter = 0.006, kTailScatter = 0.02, kTailPart = 0.15;
+/// Relative scatters of the lines about the model, of which each is as likely beforehand; that of
+/// the wide tail, and the tail's part.
+constexpr std::array<double, 3> kScatters = {0.0015, 0.003, 0.006};
+constexpr double kTailScatter = 0.02, kTailPart = 0.15;
 /// Part of the modes that are measured, and of the measured lines that are no modes.
 constexpr double kSeen = 0.7, kFalse = 0.3;
 /// The measured band reaches this far beyond its outermost lines, in the logarithm.
@@ -26,6 +29,9 @@ constexpr double kBelowBand = 0.04, kAboveBand = 0.02;
 constexpr double kUppermost = 0.3;
 /// Farther away a line and a mode are not the same.
 constexpr double kFarthest = 0.015;
+/// Of two lines near a mode the one that is 10 dB weaker must be nearer by this more than the
+/// other.
+constexpr double kPerTenDb = 1e-3;
 /// Deviations above which the loss grows linearly.
 constexpr double kSoft = 0.002;
 constexpr size_t kMostMatches = 8, kPeaks = 24;
@@ -52,12 +58,9 @@ LogLines LinesAt(const ModelLines& lines, double nu) {
   return result;
 }
 
-double Density(double deviation) {
-  const auto normal = [deviation](double scatter) {
-    const double x = deviation / scatter;
-    return std::exp(-x * x / 2) / (scatter * std::sqrt(2 * std::numbers::pi));
-  };
-  return (1 - kTailPart) * normal(kScatter) + kTailPart * normal(kTailScatter);
+double Normal(double deviation, double scatter) {
+  const double x = deviation / scatter;
+  return std::exp(-x * x / 2) / (scatter * std::sqrt(2 * std::numbers::pi));
 }
 
 /// Returns the log likelihood of a body's lines, against lines that no body explains.
@@ -76,18 +79,27 @@ double BodyScore(const std::vector<double>& measured, const LogLines& lines, dou
   const double beyond = std::max(0.0, high - std::max(low, complete_to));
   double expected = kSeen * static_cast<double>(position(high) - position(low)) +
                     kSeen * uppermost * beyond + background * width;
-  double score = 0;
+  std::array<double, kScatters.size()> scores = {};
   for (const double log_hz : measured) {
-    double density = background;
-    if (log_hz > complete_to) density += kSeen * uppermost;
+    double elsewhere = background, tails = 0;
+    std::array<double, kScatters.size()> near = {};
+    if (log_hz > complete_to) elsewhere += kSeen * uppermost;
     for (auto j = position(log_hz - 4 * kTailScatter);
          j < std::ssize(own) && own[static_cast<size_t>(j)] + log_speed < log_hz + 4 * kTailScatter;
          ++j) {
-      density += kSeen * Density(log_hz - own[static_cast<size_t>(j)] - log_speed);
+      const double deviation = log_hz - own[static_cast<size_t>(j)] - log_speed;
+      tails += Normal(deviation, kTailScatter);
+      for (size_t s = 0; s < near.size(); ++s) near[s] += Normal(deviation, kScatters[s]);
     }
-    score += std::log(density / all_false);
+    for (size_t s = 0; s < near.size(); ++s) {
+      const double modes = (1 - kTailPart) * near[s] + kTailPart * tails;
+      scores[s] += std::log((elsewhere + kSeen * modes) / all_false);
+    }
   }
-  return score - (expected - all_false * width);
+  const double most = *std::ranges::max_element(scores);
+  double mean = 0;
+  for (const double score : scores) mean += std::exp(score - most) / kScatters.size();
+  return most + std::log(mean) - (expected - all_false * width);
 }
 
 double PriorOf(double nu, const MatchSettings& settings) {
@@ -192,7 +204,7 @@ class Matcher {
     return score;
   }
 
-  /// Matches each line to one mode, the nearest pairs first.
+  /// Matches each line to one mode, the nearest and the loudest pairs first.
   void Assign(Match& match) const {
     match.lines.clear();
     for (size_t b = 0; b < bodies_.size(); ++b) {
@@ -206,8 +218,11 @@ class Matcher {
           if (std::abs(deviation) < kFarthest) pairs.push_back({b, i, j, deviation});
         }
       }
-      std::ranges::sort(pairs, {},
-                        [](const MatchedLine& pair) { return std::abs(pair.deviation); });
+      const std::vector<double>& levels_db = bodies_[b].levels_db;
+      std::ranges::sort(pairs, {}, [&](const MatchedLine& pair) {
+        const double level_db = levels_db.empty() ? 0 : levels_db[pair.measured];
+        return std::abs(pair.deviation) - kPerTenDb * level_db / 10;
+      });
       std::vector<bool> line_taken(measured_[b].size()), mode_taken(model.eigenvalues.size());
       for (const MatchedLine& pair : pairs) {
         if (line_taken[pair.measured] || mode_taken[pair.mode]) continue;

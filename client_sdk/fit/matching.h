@@ -25,6 +25,7 @@ struct MeasuredBody {
   ModelLines lines = {};
   std::vector<double> frequencies_hz = {};       ///< ascending
   std::vector<double> frequency_errors_hz = {};  ///< standard errors
+  std::vector<double> levels_db = {};            ///< against the strongest; empty: all alike
 };
 
 /// The properties of the material that are known beforehand.
@@ -57,10 +58,11 @@ struct Match {
 /// of the second.
 ///
 /// The measured lines are a Poisson process with the density rho_0 + sum_j p N(ln f; ln f_j,
-/// delta), delta = 0.6 % with a wide tail, so that missing and false lines cost little and
-/// predictions that nothing bears out do cost. The greatest values over a grid of c and nu are
-/// refined by matching each line to one mode, and least squares with a soft L1 loss. The errors of
-/// the first are those of a bootstrap over the matched lines, each moved by its error.
+/// delta), delta = 0.15, 0.3 or 0.6 % with a wide tail, so that missing and false lines cost
+/// little, predictions that nothing bears out do cost, and lines that are near tell the more. The
+/// greatest values over a grid of c and nu are refined by matching each line to one mode, and least
+/// squares with a soft L1 loss. The errors of the first are those of a bootstrap over the matched
+/// lines, each moved by its error.
 std::vector<Match> FindMatches(const std::vector<MeasuredBody>& bodies,
                                const MatchSettings& settings);
 

@@ -15,14 +15,20 @@ namespace {
 
 constexpr size_t kFewestModes = 5;
 constexpr double kLeastLogOdds = 4;
-/// Lines that match by chance are some 0.5 % apart, so that the log odds must be the greater, the
-/// nearer a match comes to that.
+/// Lines that match the mesh of another body by chance are some 0.5 % apart, so that the log odds
+/// must be the greater, the nearer a match comes to that,
 constexpr double kGoodRms = 0.0035, kLogOddsPerRms = 3500;
+/// and the greater, the larger the part of the lines that no mode explains, often half of them.
+constexpr double kLogOddsPerUnmatched = 16;
 constexpr double kMostRms = 0.01;
 /// Part of the measured lines that must be modes of the body.
 constexpr double kLeastMatched = 0.35;
 /// Decays that are known worse than this do not count.
-constexpr double kMostDecayError = 0.6;
+constexpr double kMostDecayError = 0.45;
+/// Part of the matched lines whose decay must be known for a law that is not given.
+constexpr double kLeastDecays = 0.5;
+/// What else a recording has, against its strongest line: it moves the decays of weak lines.
+constexpr double kElse = 1e-3;
 constexpr double kLeastLoudness_db = 20;
 
 absl::Status TooFew(absl::string_view what) {
@@ -52,10 +58,11 @@ MatchSettings SettingsOf(const FitSettings& settings, double density) {
 }
 
 MeasuredBody Measured(const FittedBody& body) {
-  MeasuredBody measured{.lines = body.lines, .frequencies_hz = {}, .frequency_errors_hz = {}};
+  MeasuredBody measured{.lines = body.lines};
   for (const MeasuredMode& mode : body.modes) {
     measured.frequencies_hz.push_back(mode.frequency_hz);
     measured.frequency_errors_hz.push_back(mode.frequency_error_hz);
+    measured.levels_db.push_back(mode.level_db);
   }
   return measured;
 }
@@ -82,9 +89,8 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
   }
   // The null hypothesis, by which no line is a mode of the body, is a rival, too.
   const double second = std::max(0.0, matches.size() > 1 ? matches[1].score : 0.0);
-  const double beyond = best.rms > kMostRms ? 0 : std::max(0.0, best.rms - kGoodRms);
-  const double least = kLeastLogOdds + kLogOddsPerRms * beyond;
-  if (best.score - second < least) {
+  const double odds = best.score - second;
+  if (odds < kLeastLogOdds) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MATCH_AMBIGUOUS",
         absl::StrCat(
@@ -93,12 +99,16 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
             "modulus if they are known, and see that the mesh is that of the body"));
   }
   const double matched = static_cast<double>(best.lines.size()) / static_cast<double>(line_count);
-  if (best.rms > kMostRms || matched < kLeastMatched) {
+  const double beyond = std::max(0.0, best.rms - kGoodRms);
+  const double least =
+      kLeastLogOdds + kLogOddsPerRms * beyond + kLogOddsPerUnmatched * (1 - matched);
+  if (odds < least || best.rms > kMostRms || matched < kLeastMatched) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_DISAGREES",
         absl::StrFormat(
-            "%d of %d lines match, %.2f %% apart: the mesh is not that of the body. Measure "
-            "the body again, above all its thickness, and make a model of the right mesh",
+            "%d of %d lines match, %.2f %% apart, which a wrong mesh reaches by chance. Measure "
+            "the body again, above all its thickness, and make a model of the right mesh; or "
+            "record strikes at more places",
             best.lines.size(), line_count, 100 * best.rms));
   }
   return absl::OkStatus();
@@ -127,11 +137,14 @@ std::vector<FittedLine> LinesOf(const std::vector<FittedBody>& bodies, const Mat
 std::vector<MeasuredDecay> DecaysOf(const std::vector<FittedLine>& lines) {
   std::vector<MeasuredDecay> decays;
   for (const FittedLine& line : lines) {
-    const double decay = line.measured.decay_per_s, error = line.measured.decay_error_per_s;
-    if (!line.mode || !(decay > 0) || error > kMostDecayError * decay) continue;
+    const double decay = line.measured.decay_per_s;
+    if (!line.mode || !(decay > 0)) continue;
+    const double error = std::hypot(line.measured.decay_error_per_s / decay,
+                                    kElse * std::pow(10, -line.measured.level_db / 20));
+    if (error > kMostDecayError) continue;
     decays.push_back({.frequency_hz = line.measured.frequency_hz,
                       .decay_per_s = decay,
-                      .relative_error = error / decay,
+                      .relative_error = error,
                       .radiation_per_s = line.radiation_per_s});
   }
   return decays;
@@ -167,7 +180,15 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
   fit.log_odds =
       match.score - std::max(0.0, fit.candidates.size() > 1 ? fit.candidates[1].score : 0.0);
   fit.lines = LinesOf(bodies, match, *density);
-  fit.laws = FitDamping(DecaysOf(fit.lines), settings.damping);
+  const std::vector<MeasuredDecay> decays = DecaysOf(fit.lines);
+  fit.decay_count = decays.size();
+  const auto heard = std::ranges::count_if(
+      fit.lines, [](const FittedLine& line) { return line.mode && line.measured.decay_per_s > 0; });
+  const bool known =
+      static_cast<double>(decays.size()) >= kLeastDecays * static_cast<double>(heard);
+  if (known || settings.damping != DampingKind::kAuto) {
+    fit.laws = FitDamping(decays, settings.damping);
+  }
   for (FittedLine& line : fit.lines) {
     if (line.mode && !fit.laws.empty()) {
       line.law_per_s = fit.laws[0].DecayPerS(line.measured.frequency_hz) + line.radiation_per_s;

@@ -53,9 +53,12 @@ struct MaterialFit {
   double rms = 0;  ///< of the relative deviations of the matched frequencies
   double log_odds = 0;
   std::vector<Match> candidates;  ///< of which the first was taken
-  std::vector<DampingLaw> laws;   ///< of which the first was taken; empty: no decay is known
+  /// Of which the first was taken. None if the kind of the law is not given, and a room or noise
+  /// hides the decays of most matched lines.
+  std::vector<DampingLaw> laws;
   std::vector<FittedLine> lines;
   size_t matched_count = 0;
+  size_t decay_count = 0;  ///< matched lines whose decay is known
 };
 
 /// Fits one material to all bodies. Errors: InvalidArgument (TOO_FEW_MODES, MATCH_AMBIGUOUS,

@@ -15,7 +15,7 @@
 namespace carillon::fit {
 namespace {
 
-constexpr double kLowest_hz = 40, kHighest_hz = 20'000;
+constexpr double kLowest_hz = 40, kHighest_hz = 22'000;
 constexpr double kHighestOfRate = 0.46;
 constexpr int kMostOrder = 18, kMostHeight = 160, kLeastHeight = 10;
 /// Where windows begin after the blow, s: after the contact, and after the blur of the filter. Each
@@ -38,8 +38,10 @@ constexpr double kSharp = 2e-4, kSharpDecay = 0.2;
 constexpr double kHum_per_s = 0.03;
 /// Decays this near to the room's are hard to tell from it.
 constexpr double kNearRoom = 0.3;
-/// A decay that is this many times as fast as the room's cannot be told from it.
-constexpr double kHidden = 4;
+/// The least relative error of a decay in a room, and that of one as fast as the room's, which
+/// grows with the power 1.5 of the ratio of both: so they were in simulated rooms. Of a mode that
+/// dies much sooner than the room only the room is left where the window begins.
+constexpr double kLeastErrorInRoom = 0.015, kErrorAtRoom = 0.15;
 
 /// A pole of one run, in Hz and 1/s.
 struct Pole {
@@ -393,13 +395,10 @@ void TellRoomApart(const std::vector<Band>& bands, const Progress& progress,
       MeasuredMode& mode = extracted.modes[refined.index];
       mode.frequency_hz = bands[b].centre_hz() + refined.frequency_hz;
       mode.decay_per_s = refined.decay_per_s;
-      // Of a mode that dies much sooner than the room only the room is left where the window
-      // begins.
-      const bool hidden = refined.decay_per_s > kHidden * extracted.room.decay_per_s;
-      mode.decay_error_per_s =
-          hidden ? refined.decay_per_s
-                 : std::max(0.03 * refined.decay_per_s, refined.decay_error_per_s);
-      mode.near_room = std::abs(refined.decay_per_s / extracted.room.decay_per_s - 1) < kNearRoom;
+      const double ratio = refined.decay_per_s / extracted.room.decay_per_s;
+      const double least = std::max(kLeastErrorInRoom, kErrorAtRoom * std::pow(ratio, 1.5));
+      mode.decay_error_per_s = std::max(least * refined.decay_per_s, refined.decay_error_per_s);
+      mode.near_room = std::abs(ratio - 1) < kNearRoom;
     }
     progress(0.6 + 0.4 * static_cast<double>(b + 1) / static_cast<double>(all.size()));
   }

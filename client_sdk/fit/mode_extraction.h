@@ -35,7 +35,7 @@ struct ExtractedModes {
 /// Is told how much is done, 0 to 1.
 using Progress = std::function<void(double)>;
 
-/// Finds the modes of a struck body in its rings, in order of their frequencies, up to 20 kHz.
+/// Finds the modes of a struck body in its rings, in order of their frequencies, up to 22 kHz.
 ///
 /// Bands of 400 Hz are cut from the sounds. In each, ESPRIT finds poles for 18 model orders, three
 /// starts and two lengths of the window; a pole that is stable over 40 % of these is a mode, with

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "client_sdk/fit/esprit.h"
 
@@ -15,16 +16,21 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// The rooms that are tried, for a microphone near the body, and the bands that they are tried on.
-constexpr std::array<double, 8> kRoomDecays_per_s = {7, 9.5, 13, 17, 22, 29, 39, 52};
-constexpr std::array<double, 4> kShares = {0.03, 0.06, 0.12, 0.25};
+/// The rooms that are tried, of which each is faster by the same factor, with the share of a
+/// microphone near the body, from which the level of each mode's own tail departs. The bands that
+/// they are tried on.
+constexpr std::array<double, 8> kRoomDecays_per_s = {7, 9.3, 12.4, 16.5, 22, 29.3, 39, 52};
+constexpr double kShare = 0.1, kMostLevel = 3;
 constexpr size_t kMostBands = 12, kMostModes = 6;
 /// Nepers that one band may vote with, and by which a room must be better than none.
 constexpr double kVote = 12, kLeastGain = 25;
 /// Part of all votes by which it must be better.
 constexpr double kLeastAgreed = 0.25;
-/// The part of a ring that is used: after the blow, and as long as a room may be heard.
-constexpr double kStart_s = 0.00625, kUsed_s = 0.8;
+/// The part of a ring that is used: after the blow, and as long as a room may be heard. Every
+/// second sample is, because a band is half as wide as its rate: the filter takes the room's noise
+/// for white.
+constexpr double kStart_s = 0.0075, kUsed_s = 0.8;
+constexpr size_t kEvery = 2;
 /// A room lets fast modes seem slower than they are, and leaves slow ones as they are: no decay is
 /// less than this part of what it seems to be.
 constexpr double kSlowest = 0.65;
@@ -44,35 +50,38 @@ Complex PoleOf(const BandMode& mode, double rate_hz) {
 class RingFilter {
  public:
   RingFilter(const BandRings::Ring& ring, const std::vector<BandMode>& modes)
-      : ring_(ring), count_(modes.size()) {
-    start_ = static_cast<size_t>(kStart_s * ring.rate_hz);
-    end_ = std::min(ring.samples.size(), static_cast<size_t>(kUsed_s * ring.rate_hz));
+      : rate_hz_(ring.rate_hz / kEvery), count_(modes.size()) {
+    for (size_t n = 0; n < ring.samples.size(); n += kEvery) samples_.push_back(ring.samples[n]);
+    start_ = static_cast<size_t>(std::lround(kStart_s * rate_hz_));
+    end_ = std::min(samples_.size(), static_cast<size_t>(kUsed_s * rate_hz_));
     if (end_ < start_ + 4 * count_ + 8) {
       end_ = start_;
       return;
     }
     std::vector<Complex> poles;
     poles.reserve(modes.size());
-    for (const BandMode& mode : modes) poles.push_back(PoleOf(mode, ring.rate_hz));
-    const auto window = Signal(ring.samples).subspan(start_, end_ - start_);
+    for (const BandMode& mode : modes) poles.push_back(PoleOf(mode, rate_hz_));
+    const auto window = Signal(samples_).subspan(start_, end_ - start_);
     for (const Complex& a : Amplitudes(window, poles)) power_.push_back(std::norm(a));
     double most = 0;
     for (const Complex& x : window) most = std::max(most, std::norm(x));
     noise_ = ring.noise + kUnknown * most + 1e-300;
   }
 
-  /// The log likelihood, less a constant, with the amplitudes that fit best.
-  double LogLikelihood(const std::vector<BandMode>& modes, const Room& room) const {
+  /// The log likelihood, less a constant, with the amplitudes that fit best. `levels` has, for each
+  /// mode, the logarithm of the power of its tail over that of a usual room.
+  double LogLikelihood(const std::vector<BandMode>& modes, const std::vector<double>& levels,
+                       const Room& room) const {
     if (end_ == start_) return 0;
     const size_t m = count_, width = m + 1;
     std::vector<Complex> poles, covariance(m * m), states(m * width), direct(m, 1.0), gain(m);
-    const double start_s = static_cast<double>(start_) / ring_.rate_hz;
+    const double start_s = static_cast<double>(start_) / rate_hz_;
     std::vector<double> drive(m);
     for (size_t k = 0; k < m; ++k) {
-      poles.push_back(PoleOf(modes[k], ring_.rate_hz));
+      poles.push_back(PoleOf(modes[k], rate_hz_));
       const double d = modes[k].decay_per_s, apart = 2 * (d - room.decay_per_s);
       const double onset_power = power_[k] * std::exp(2 * d * start_s);
-      drive[k] = onset_power * 2 * room.decay_per_s * room.share;
+      drive[k] = onset_power * 2 * room.decay_per_s * room.share * std::exp(levels[k]);
       const double grown = std::abs(apart) < 1e-6 ? start_s : std::expm1(apart * start_s) / apart;
       covariance[k * m + k] = drive[k] * std::exp(-2 * d * start_s) * grown;
     }
@@ -81,7 +90,7 @@ class RingFilter {
     double log_sum = 0;
     std::vector<Complex> innovation(width);
     for (size_t n = start_; n < end_; ++n) {
-      const double t = static_cast<double>(n) / ring_.rate_hz;
+      const double t = static_cast<double>(n) / rate_hz_;
       double variance = noise_;
       for (size_t j = 0; j < m; ++j) {
         gain[j] = 0;
@@ -90,7 +99,7 @@ class RingFilter {
       }
       variance = std::max(variance, noise_);
       log_sum += std::log(variance);
-      innovation[0] = ring_.samples[n];
+      innovation[0] = samples_[n];
       for (size_t k = 0; k < m; ++k) innovation[k + 1] = direct[k];
       for (size_t s = 0; s < width; ++s) {
         for (size_t k = 0; k < m; ++k) innovation[s] -= states[k * width + s];
@@ -105,7 +114,7 @@ class RingFilter {
         for (size_t k = 0; k < m; ++k) covariance[j * m + k] -= Product(part, std::conj(gain[k]));
         for (size_t s = 0; s < width; ++s) states[j * width + s] += Product(part, innovation[s]);
       }
-      const double now = std::exp(-2 * room.decay_per_s * t) / ring_.rate_hz;
+      const double now = std::exp(-2 * room.decay_per_s * t) / rate_hz_;
       for (size_t j = 0; j < m; ++j) {
         for (size_t k = 0; k < m; ++k) {
           covariance[j * m + k] =
@@ -141,10 +150,17 @@ class RingFilter {
     return normal[0].real();
   }
 
-  const BandRings::Ring& ring_;
+  std::vector<Complex> samples_;
+  double rate_hz_;
   size_t count_, start_ = 0, end_ = 0;
   std::vector<double> power_;
   double noise_ = 0;
+};
+
+/// What is varied until it explains a band best.
+struct Explanation {
+  std::vector<BandMode> modes;
+  std::vector<std::vector<double>> levels;  ///< #rings by #modes
 };
 
 /// The likelihood of a band.
@@ -154,45 +170,60 @@ class BandLikelihood {
     for (const BandRings::Ring& ring : band.rings) filters_.emplace_back(ring, band.modes);
   }
 
-  double operator()(const std::vector<BandMode>& modes, const Room& room) const {
+  double operator()(const Explanation& tried, const Room& room) const {
     double sum = 0;
-    for (const RingFilter& filter : filters_) sum += filter.LogLikelihood(modes, room);
+    for (size_t r = 0; r < filters_.size(); ++r) {
+      sum += filters_[r].LogLikelihood(tried.modes, tried.levels[r], room);
+    }
     return sum;
   }
 
-  /// Climbs by steps of frequencies and decays. Returns the likelihood reached.
-  double Climb(std::vector<BandMode>& modes, const Room& room,
-               std::span<const double> steps) const {
-    double most = (*this)(modes, room);
-    std::vector<double> least;
-    least.reserve(modes.size());
-    for (const BandMode& mode : modes) least.push_back(kSlowest * mode.decay_per_s);
+  Explanation Beginning(const std::vector<BandMode>& modes) const {
+    return {.modes = modes,
+            .levels = std::vector(filters_.size(), std::vector<double>(modes.size()))};
+  }
+
+  /// Climbs by steps of decays, frequencies, and levels of tails. Returns the likelihood reached.
+  double Climb(Explanation& best, const Room& room, std::span<const double> steps) const {
+    const std::vector<BandMode> first = best.modes;
+    double most = (*this)(best, room);
     for (const double step : steps) {
-      for (size_t k = 0; k < modes.size(); ++k) {
-        Try(k, step, 0, room, least[k], modes, most);
-        Try(k, 0, step * modes[k].decay_per_s / 10, room, least[k], modes, most);
+      for (size_t k = 0; k < first.size(); ++k) {
+        const auto decay = [&](Explanation& tried, double sign) {
+          tried.modes[k].decay_per_s *= std::exp(sign * step);
+          return tried.modes[k].decay_per_s >= kSlowest * first[k].decay_per_s;
+        };
+        const auto frequency = [&](Explanation& tried, double sign) {
+          tried.modes[k].frequency_hz += sign * step * tried.modes[k].decay_per_s / 10;
+          return true;
+        };
+        Try(decay, room, best, most);
+        Try(frequency, room, best, most);
+        if (room.share == 0) continue;
+        for (size_t r = 0; r < filters_.size(); ++r) {
+          const auto level = [&](Explanation& tried, double sign) {
+            tried.levels[r][k] += sign * 3 * step;
+            return std::abs(tried.levels[r][k]) <= kMostLevel;
+          };
+          Try(level, room, best, most);
+        }
       }
     }
     return most;
   }
 
  private:
-  /// Moves mode k by factors of its decay, or by steps of its frequency, as long as it helps.
-  void Try(size_t k, double log_decay, double hz, const Room& room, double least_decay,
-           std::vector<BandMode>& modes, double& most) const {
+  /// Moves up or down as long as the move is allowed and helps.
+  template <typename Move>
+  void Try(const Move& move, const Room& room, Explanation& best, double& most) const {
     for (const double sign : {1.0, -1.0}) {
       bool moved = false;
       for (int times = 0; times < 6; ++times) {
-        const BandMode before = modes[k];
-        modes[k].decay_per_s *= std::exp(sign * log_decay);
-        modes[k].frequency_hz += sign * hz;
-        const bool allowed = modes[k].decay_per_s >= least_decay;
-        const double reached = allowed ? (*this)(modes, room) : most;
-        if (reached <= most) {
-          modes[k] = before;
-          break;
-        }
-        most = reached, moved = true;
+        Explanation tried = best;
+        if (!move(tried, sign)) break;
+        const double reached = (*this)(tried, room);
+        if (reached <= most) break;
+        best = std::move(tried), most = reached, moved = true;
       }
       if (moved) return;
     }
@@ -200,6 +231,12 @@ class BandLikelihood {
 
   std::vector<RingFilter> filters_;
 };
+
+/// Returns where a parabola through three evenly spaced values is least, in steps from the middle.
+double LeastBetween(double before, double middle, double after) {
+  const double bend = before - 2 * middle + after;
+  return bend > 0 ? std::clamp((before - after) / (2 * bend), -0.5, 0.5) : 0;
+}
 
 /// Returns the room that most bands are content with. A band in which something else than the room
 /// deviates, such as a mode that was not found, has no more than one vote.
@@ -210,8 +247,8 @@ Room Elect(const std::vector<BandRings>& bands, const std::vector<BandLikelihood
   for (size_t b = 0; b < bands.size(); ++b) {
     std::vector<double> reached;
     for (const Room& room : rooms) {
-      std::vector<BandMode> modes = bands[b].modes;
-      reached.push_back(likelihoods[b].Climb(modes, room, kSteps));
+      Explanation explanation = likelihoods[b].Beginning(bands[b].modes);
+      reached.push_back(likelihoods[b].Climb(explanation, room, kSteps));
     }
     const double most = *std::ranges::max_element(reached);
     for (size_t r = 0; r < rooms.size(); ++r) losses[r] += std::min(kVote, most - reached[r]);
@@ -219,7 +256,13 @@ Room Elect(const std::vector<BandRings>& bands, const std::vector<BandLikelihood
   const auto best = static_cast<size_t>(std::ranges::min_element(losses) - losses.begin());
   const double least_gain =
       std::max(kLeastGain, kLeastAgreed * kVote * static_cast<double>(bands.size()));
-  return losses[0] - losses[best] > least_gain ? rooms[best] : rooms[0];
+  if (losses[0] - losses[best] <= least_gain) return rooms[0];
+  Room room = rooms[best];
+  if (best > 1 && best + 1 < rooms.size()) {
+    const double step = LeastBetween(losses[best - 1], losses[best], losses[best + 1]);
+    room.decay_per_s *= std::pow(room.decay_per_s / rooms[best - 1].decay_per_s, step);
+  }
+  return room;
 }
 
 void KeepDecaying(BandRings& band) {
@@ -247,9 +290,8 @@ Room FindRoom(std::vector<BandRings> bands) {
     likelihoods.emplace_back(band);
   }
   std::vector<Room> rooms = {Room()};
-  for (const double share : kShares) {
-    for (const double decay : kRoomDecays_per_s)
-      rooms.push_back({.decay_per_s = decay, .share = share});
+  for (const double decay : kRoomDecays_per_s) {
+    rooms.push_back({.decay_per_s = decay, .share = kShare});
   }
   return Elect(bands, likelihoods, rooms);
 }
@@ -259,17 +301,23 @@ void RefineInRoom(const Room& room, BandRings& band) {
   KeepDecaying(band);
   const BandLikelihood likelihood(band);
   constexpr std::array<double, 4> kSteps = {0.25, 0.1, 0.04, 0.015};
-  const double most = likelihood.Climb(band.modes, room, kSteps);
-  for (BandMode& mode : band.modes) {
+  const Explanation first = likelihood.Beginning(band.modes);
+  Explanation best = first;
+  const double most = likelihood.Climb(best, room, kSteps);
+  for (size_t k = 0; k < band.modes.size(); ++k) {
     constexpr double kStep = 0.1;
-    const double decay = mode.decay_per_s;
+    const double decay = best.modes[k].decay_per_s;
     double fall = 0;
     for (const double sign : {1.0, -1.0}) {
-      mode.decay_per_s = decay * std::exp(sign * kStep);
-      fall += (most - likelihood(band.modes, room)) / 2;
+      Explanation tried = best;
+      tried.modes[k].decay_per_s *= std::exp(sign * kStep);
+      fall += (most - likelihood(tried, room)) / 2;
     }
-    mode.decay_per_s = decay;
-    mode.decay_error_per_s = decay * std::min(3.0, kStep / std::sqrt(2 * std::max(1e-6, fall)));
+    band.modes[k] = best.modes[k];
+    // What still falls at its bound is no sum of these modes in the room.
+    const bool bounded = decay < 1.03 * kSlowest * first.modes[k].decay_per_s;
+    band.modes[k].decay_error_per_s =
+        bounded ? decay : decay * std::min(3.0, kStep / std::sqrt(2 * std::max(1e-6, fall)));
   }
 }
 

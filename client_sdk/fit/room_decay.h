@@ -10,7 +10,7 @@ namespace carillon::fit {
 /// How a room answers: its impulse response has, beside the direct sound, noise that decays.
 struct Room {
   double decay_per_s = 0;  ///< ln(1000) over the reverberation time
-  double share = 0;        ///< energy of the reverberation over that of the direct sound; 0: none
+  double share = 0;        ///< usual energy of the tail over that of the direct sound; 0: no room
 };
 
 /// A mode in a band. The frequency is relative to the band's centre.
@@ -37,8 +37,8 @@ struct BandRings {
 ///
 /// Each mode k of pole p_k is heard as a_k exp(p_k t) + x_k, with dx_k = p_k x_k dt + |a_k| q^(1/2)
 /// exp(-d_room t) dW, because the room's tail is noise of the power q exp(-2 d_room t) that the
-/// mode is convolved with; q = 2 d_room share. The likelihood of a band follows from a Kalman
-/// filter.
+/// mode is convolved with. The level q is found for each mode and ring by itself. The likelihood of
+/// a band follows from a Kalman filter.
 Room FindRoom(std::vector<BandRings> bands);
 
 /// Changes frequencies and decays of the modes to the most likely ones in the room, and gives the

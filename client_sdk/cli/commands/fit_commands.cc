@@ -134,7 +134,10 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
                         fit.young_over_density, 200 * fit.young_over_density_error,
                         2 * fit.poisson_error, fit.matched_count, 100 * fit.rms, fit.log_odds);
   if (fit.laws.empty()) {
-    absl::StrAppend(&text, "# No decay was measured: give the damping beside this file.\n");
+    absl::StrAppendFormat(&text,
+                          "# The decays of only %d of the matched lines are known, so that no "
+                          "damping was found: give it beside this file.\n",
+                          fit.decay_count);
   } else {
     absl::StrAppendFormat(&text,
                           "# Damping: %s, within a factor of %.2f of half of the decay rates.\n",
@@ -202,6 +205,7 @@ Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
           {"matched", fit.matched_count},
           {"rms", fit.rms},
           {"log_odds", fit.log_odds},
+          {"decay_count", fit.decay_count},
           {"laws", laws},
           {"lines", lines},
           {"bodies", bodies},
@@ -256,6 +260,13 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
                fit.young_over_density, 200 * fit.young_over_density_error);
   absl::PrintF("E           %.5g GPa at %.5g kg/m^3\n", fit.young_pa / 1e9, fit.density_kg_per_m3);
   absl::PrintF("Poisson     %.4f +- %.4f\n", fit.poisson_ratio, 2 * fit.poisson_error);
+  if (fit.laws.empty()) {
+    absl::PrintF(
+        "damping     not found: the decays of only %d of %s are known, and the room or the noise "
+        "hides the others; record nearer and where there is less echo, or name the law "
+        "(--damping)\n",
+        fit.decay_count, Counted(fit.matched_count, "matched line"));
+  }
   for (size_t k = 0; k < fit.laws.size(); ++k) {
     const fit::DampingLaw& law = fit.laws[k];
     std::string figures;

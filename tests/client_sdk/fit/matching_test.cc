@@ -56,6 +56,18 @@ TEST(FindMatches, TwoBodiesTellMoreThanOne) {
   EXPECT_NEAR(both[0].speed_m_per_s / kSpeed_m_per_s, 1, 0.004);
 }
 
+TEST(FindMatches, OfTwoLinesNearAModeTheLouderIsMatched) {
+  MeasuredBody body = Measured({0, 1, 2, 3, 4, 5, 6, 7}, {});
+  const double loud_hz = body.frequencies_hz[5];
+  body.frequencies_hz.insert(body.frequencies_hz.begin() + 5, 0.9985 * loud_hz);
+  body.frequency_errors_hz.push_back(1);
+  body.levels_db.assign(9, -3);
+  body.levels_db[5] = -30;
+  for (const MatchedLine& line : FindMatches({body}, {.poisson_ratio = kNu})[0].lines) {
+    EXPECT_NE(line.measured, 5U) << "the quiet one";
+  }
+}
+
 TEST(FindMatches, AGivenRatioIsKept) {
   const std::vector<Match> matches =
       FindMatches({Measured({0, 1, 2, 3, 4, 5, 6}, {})}, {.poisson_ratio = 0.34});

@@ -43,6 +43,36 @@ TEST(FitMaterial, FindsTheMaterialWithTheMassOfTheBody) {
   EXPECT_NEAR(fit->laws[0].DecayPerS(2000), std::numbers::pi * 2000 * kLossFactor, 0.1);
 }
 
+TEST(FitMaterial, AQuietLineDoesNotBendTheLawOfDamping) {
+  FittedBody body = Body(7);
+  body.modes[3].decay_per_s *= 20;
+  body.modes[3].decay_error_per_s = 0.02 * body.modes[3].decay_per_s;
+  body.modes[3].level_db = -65;
+  const auto fit = FitMaterial({body}, {.density_kg_per_m3 = kDensity});
+  ASSERT_TRUE(fit.ok()) << fit.status();
+  for (const FittedLine& line : fit->lines) {
+    const double hz = line.measured.frequency_hz;
+    EXPECT_NEAR(line.law_per_s / (std::numbers::pi * hz * kLossFactor), 1, 0.02) << hz;
+  }
+}
+
+TEST(FitMaterial, GivesNoDampingWhereMostDecaysAreHiddenUnlessItsLawIsGiven) {
+  FittedBody body = Body(9);
+  for (size_t k = 3; k < body.modes.size(); ++k) {
+    body.modes[k].decay_per_s *= 3;
+    body.modes[k].decay_error_per_s = body.modes[k].decay_per_s;
+  }
+  const auto fit = FitMaterial({body}, {.density_kg_per_m3 = kDensity});
+  ASSERT_TRUE(fit.ok()) << fit.status();
+  EXPECT_THAT(fit->laws, ::testing::IsEmpty());
+  EXPECT_EQ(fit->decay_count, 3U);
+  const auto given =
+      FitMaterial({body}, {.density_kg_per_m3 = kDensity, .damping = DampingKind::kEta});
+  ASSERT_TRUE(given.ok()) << given.status();
+  ASSERT_EQ(given->laws.size(), 1U);
+  EXPECT_NEAR(given->laws[0].DecayPerS(2000), std::numbers::pi * 2000 * kLossFactor, 0.1);
+}
+
 TEST(FitMaterial, RefusesWithoutMassAndDensity) {
   EXPECT_THAT(FitMaterial({Body(12)}, {}).status().ToString(), HasSubstr("INVALID_MATERIAL"));
 }

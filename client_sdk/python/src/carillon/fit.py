@@ -60,9 +60,9 @@ class Extraction:
 class Fit:
     """A material, and how it explains the recordings. Errors are standard errors, that of E/rho is relative. `text` is
     the material as a file that `carillon ... --material-file` reads. `laws` are the laws of damping, the chosen one
-    first, as `carillon --json material fit` prints them. `modes_hz` has the frequencies of all modes of each body with
-    that material. `residual` is what the matched modes leave of the first strike, and `residual_shares` its share of
-    the energy from one second to another."""
+    first, as `carillon --json material fit` prints them, and empty where a room or noise hides most decays. `modes_hz`
+    has the frequencies of all modes of each body with that material. `residual` is what the matched modes leave of the
+    first strike, and `residual_shares` its share of the energy from one second to another."""
 
     material: material_pb2.Material
     text: str
