@@ -84,7 +84,7 @@ void Diagnostics::Reject(uint64_t count, absl::Status reason) {
 
 absl::Status Diagnostics::last_rejection() const {
   if (last_rejection_.ok() || step_count_ <= 1) return last_rejection_;
-  const absl::Status newest = AtTime(last_rejection_, last_rejected_time_s_);
+  absl::Status newest = AtTime(last_rejection_, last_rejected_time_s_);
   if (first_rejected_time_s_ == last_rejected_time_s_) return newest;
   v1::ErrorInfo error = ToErrorInfo(newest);
   const std::string first = ShortestDecimal(first_rejected_time_s_);

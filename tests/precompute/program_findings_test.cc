@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "tests/precompute/carillon_precompute_run.h"
 
 namespace carillon::precompute {
@@ -63,7 +64,7 @@ TEST_F(ProgramFindingsTest, ALargeBodyIsMadeOfMetresOnlyIfTheUnitIsStated) {
   for (const Json& remedy : Json::parse(refused.output).at("error").at("remedies")) {
     EXPECT_EQ(remedy.at("option"), "--unit");
     const std::string unit = remedy.at("value");
-    const Result made = Run(options + " --unit " + unit);
+    const Result made = Run(absl::StrCat(options, " --unit ", unit));
     ASSERT_EQ(made.exit_status, 0) << unit;
     std::filesystem::remove(model);
     const Json lengths = Json::parse(made.output).at("body").at("lengths_m");

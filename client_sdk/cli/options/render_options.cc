@@ -94,11 +94,6 @@ bool IsFolder(const std::string& path) {
   return std::filesystem::is_directory(path, ignored);
 }
 
-bool IsFile(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(path, ignored);
-}
-
 std::string WhyNoFolder(const std::string& out) {
   std::error_code ignored;
   if (out != "-" && (!std::filesystem::exists(out, ignored) || IsFolder(out))) return "";
@@ -114,7 +109,7 @@ void CheckUse(const CLI::App& render, const RenderOptions& options) {
                                absl::StrCat("is for a folder of traces, and \"", options.trace,
                                             "\" is none; name a folder, or leave the option out"));
   }
-  if (!options.html.empty() && (options.out == "-" || !IsFile(options.trace))) {
+  if (!options.html.empty() && (options.out == "-" || options.trace == "-" || is_folder)) {
     throw CLI::ValidationError(
         "--html", "needs a trace in a file, and a file for --out: the page has both in it");
   }

@@ -140,8 +140,8 @@ void OfflineRenderer::FadeHeld() {
     held.frame_count = std::min(held.frame_count, fade - faded);
     held.samples.resize(std::min(held.samples.size(), held.frame_count * channel_count));
     for (size_t i = 0; i < held.samples.size(); ++i) {
-      const double part =
-          static_cast<double>(faded + i / channel_count) / static_cast<double>(fade);
+      const size_t frame = faded + i / channel_count;
+      const double part = static_cast<double>(frame) / static_cast<double>(fade);
       held.samples[i] *= static_cast<float>(0.5 + 0.5 * std::cos(std::numbers::pi * part));
     }
     faded += held.frame_count;

@@ -59,19 +59,21 @@ class ConsoleTest(DaemonTest):
         return pages
 
     def write_trace(self):
-        """Writes a trace of two bars that fly and are struck in turn, and renders it; returns its file and its page."""
-        file, page = self.folder / "flight.contacts", self.folder / "flight.html"
-        trace = carillon.Trace(step=0.1)
+        """Writes a trace of two bars that fly and are struck in turn, and its page with a label that ends a script; returns both files."""
         with carillon.connect(self.daemon.server) as client:
             bar = client.create_model(self.bar, material="structural_steel")
         damped = carillon.material("structural_steel", loss_factor=0.02)  # each blow is over before the next
-        handles = [trace.add(bar, damped, label=label) for label in ("left", "right</script>")]
-        for step in range(10):
-            impacts = carillon.Impacts(handles[step % 2], [[0, 0, 0]], [[0, 0, 0.02]])
-            trace.step(step * 0.1, impacts=impacts if step < 6 else None,
-                       poses=carillon.Poses(handles, [[0, 0.1 * step, 0], [0.5, -0.1 * step, 0]]))
-        trace.write(file)
-        self.daemon.command("render", "--tail", "0.5", "--out", self.folder / "flight.wav", "--html", page, file)
+        for name, right in (("flight", "right"), ("page", "right</script>")):
+            trace = carillon.Trace(step=0.1)
+            handles = [trace.add(bar, damped, label=label) for label in ("left", right)]
+            for step in range(10):
+                impacts = carillon.Impacts(handles[step % 2], [[0, 0, 0]], [[0, 0, 0.02]])
+                trace.step(step * 0.1, impacts=impacts if step < 6 else None,
+                           poses=carillon.Poses(handles, [[0, 0.1 * step, 0], [0.5, -0.1 * step, 0]]))
+            trace.write(self.folder / f"{name}.contacts")
+        file, page = self.folder / "flight.contacts", self.folder / "flight.html"
+        self.daemon.command("render", "--tail", "0.5", "--out", self.folder / "flight.wav", "--html", page,
+                            self.folder / "page.contacts")
         return file, page
 
     def simulate(self):
