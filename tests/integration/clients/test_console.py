@@ -59,7 +59,10 @@ class ConsoleTest(DaemonTest):
         return pages
 
     def write_trace(self):
-        """Writes a trace of two bars that fly and are struck in turn, and its page with a label that ends a script; returns both files."""
+        """Writes a trace of two bars that fly and are struck in turn, and its page, of which a label ends a script.
+
+        Returns both files.
+        """
         with carillon.connect(self.daemon.server) as client:
             bar = client.create_model(self.bar, material="structural_steel")
         damped = carillon.material("structural_steel", loss_factor=0.02)  # each blow is over before the next
