@@ -298,8 +298,8 @@ std::string MistakeText(const CLI::App& app, const CLI::ParseError& error) {
   return absl::StrCat(parts[0], " cannot be ", given, ": ", option->get_description(), help);
 }
 
-/// Prints what is wrong with the command line to stderr, and with --json its first line to stdout
-/// as an error. Returns the exit code.
+/// Prints a usage error to stderr, and with --json its first line to stdout as an error object.
+/// Returns the exit code.
 int ReportMistake(const std::string& what, int argc, char** argv) {
   std::cerr << "carillon: " << what << '\n';
   const auto is_json = [](absl::string_view word) { return word == "--json"; };

@@ -29,8 +29,8 @@ constexpr double kBelowBand = 0.04, kAboveBand = 0.02;
 constexpr double kUppermost = 0.3;
 /// Farther away a line and a mode are not the same.
 constexpr double kFarthest = 0.015;
-/// Of two lines near a mode the one that is 10 dB weaker must be nearer by this more than the
-/// other.
+/// A line that is 10 dB weaker than another one near the same mode is matched to the mode only if
+/// it is nearer by more than this.
 constexpr double kPerTenDb = 1e-3;
 /// Deviations above which the loss grows linearly.
 constexpr double kSoft = 0.002;

@@ -53,8 +53,8 @@ struct MaterialFit {
   double rms = 0;  ///< of the relative deviations of the matched frequencies
   double log_odds = 0;
   std::vector<Match> candidates;  ///< of which the first was taken
-  /// Of which the first was taken. None if the kind of the law is not given, and a room or noise
-  /// hides the decays of most matched lines.
+  /// The laws that were tried, the one that was taken first. There is none if the kind of the law
+  /// is not given, and a room or noise hides the decays of most matched lines.
   std::vector<DampingLaw> laws;
   std::vector<FittedLine> lines;
   size_t matched_count = 0;

@@ -157,7 +157,7 @@ class RingFilter {
   double noise_ = 0;
 };
 
-/// What is varied until it explains a band best.
+/// The decays and the levels of a band's modes, which are varied until they explain the band best.
 struct Explanation {
   std::vector<BandMode> modes;
   std::vector<std::vector<double>> levels;  ///< #rings by #modes

@@ -24,8 +24,8 @@ struct PairPlacement {
 };
 
 /// Returns the places at which two bodies that lie so may touch: those with a gap within `reach_m`
-/// of zero, and at most `beyond_m` more than the least; without it all of them.
-/// Of many, the ones farthest apart.
+/// of zero. If `beyond_m` is given, their gaps exceed the least gap by at most that. If there are
+/// too many for the solver, the ones that are farthest apart are returned.
 std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
                                          const PairPlacement& at, double reach_m,
                                          std::optional<double> beyond_m);

@@ -209,10 +209,12 @@ absl::Status AddInp(const std::filesystem::path& deck, const std::string& name, 
 
 absl::StatusOr<std::string> ReadInp(const std::filesystem::path& path) {
   ASSIGN_OR_RETURN(std::string bytes, ReadOne(path));
-  const std::vector<absl::string_view> lines = absl::StrSplit(bytes, '\n');
-  if (std::ranges::none_of(lines, [](auto line) { return InputOf(line).has_value(); })) {
-    return bytes;
+  bool includes = false;
+  for (const absl::string_view line : absl::StrSplit(bytes, '\n')) {
+    includes = InputOf(line).has_value();
+    if (includes) break;
   }
+  if (!includes) return bytes;
   std::string joined;
   RETURN_IF_ERROR(AddInp(path, "", 0, bytes, joined));
   return joined;

@@ -188,7 +188,7 @@ class ModelCreation {
       if (answer.has_job() && requested_.contains(name)) {
         (HasEnded(answer.job()) ? ended : active).insert(name);
       }
-      // What is not among the jobs that wait or run has ended before.
+      // A requested job that is not among those that wait or run has ended before.
       for (auto at = requested_.begin(); !answer.has_job() && at != requested_.end(); ++at) {
         if (!active.contains(at->first)) ended.insert(at->first);
       }

@@ -3,7 +3,7 @@
 // name carillon, scene or contacts.
 import RAPIER from '@dimforge/rapier3d-compat';
 import * as THREE from 'three';
-import { RapierContacts } from '../../adapters/rapier_contacts';
+import { RapierContacts } from 'carillon/adapters/rapier_contacts';
 import { Carillon } from '@carillon/web';
 
 const SIZE_M = [0.2, 0.016, 0.01];

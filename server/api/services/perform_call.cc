@@ -233,7 +233,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   bool answers_ = false;  // whether samples are to be sent
   bool ended_ = false;
   std::map<std::string, v1::Warning> warnings_;  // by id
-  std::span<const float> samples_;               // of the last step
+  std::span<const float> samples_;               // that the newest step rendered
   size_t sent_count_ = 0;                        // environments whose samples were sent
 };
 

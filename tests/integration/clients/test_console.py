@@ -47,6 +47,8 @@ class ConsoleTest(DaemonTest):
         with tarfile.open(BUILD / "client_sdk/console/pages/carillon-web.tgz") as package:
             package.extractall(modules / "@carillon")
         web = (modules / "@carillon/package").rename(modules / "@carillon/web")
+        (modules / "carillon").mkdir()  # the package for Node, of which the page needs the adapters alone
+        (modules / "carillon/adapters").symlink_to(ROOT / "client_sdk/adapters")
         console, engines = os.environ["CARILLON_CONSOLE_MODULES"], os.environ["CARILLON_ENGINE_MODULES"]
         esbuild, = pathlib.Path(console).glob("@esbuild/linux-*/bin/esbuild")
         example = ROOT / "client_sdk/examples/browser"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 import { useEffect, useRef } from 'preact/hooks';
 import { effect } from '@preact/signals';
+import { newtonSeconds, strikerOf } from './blow_text';
 import { LiveView, MOST_DOTS } from './live_view';
 import * as live from './live_state';
-import type { SeenBlow } from './live_state';
 import { fetchSurface } from './modal_model';
 import { hear, heardScene } from './sounding';
 import * as state from './state';
@@ -51,17 +51,13 @@ function Findings() {
   </section>;
 }
 
-const size = (impulse?: { x: number; y: number; z: number }) => Math.hypot(impulse?.x ?? 0, impulse?.y ?? 0, impulse?.z ?? 0);
-
-const striker = ({ striker: by }: SeenBlow['blow']) => (by.case === 'otherObject' ? `body ${by.value}` : by.case === 'partner' ? `#${by.value}` : '');
-
 /** The blow that was chosen, and the step that made it. */
 function Origin() {
   const chosen = live.chosen.value;
   if (!chosen) return null;
   const { blow } = chosen, stepS = live.stepTimeOf(chosen), { x, y, z } = blow.pointM ?? { x: 0, y: 0, z: 0 };
-  return <p role="status" class="origin">The blow at {blow.timeS.toFixed(3)} s on body {blow.object}{striker(blow) && ` by ${striker(blow)}`}, point {[x, y, z]
-    .map((metres) => (1000 * metres).toFixed(1)).join(', ')} mm of its frame, {size(blow.impulseNewtonSeconds).toPrecision(2)} N s
+  return <p role="status" class="origin">The blow at {blow.timeS.toFixed(3)} s on body {blow.object}{strikerOf(blow) && ` by ${strikerOf(blow)}`}, point {[x, y, z]
+    .map((metres) => (1000 * metres).toFixed(1)).join(', ')} mm of its frame, {newtonSeconds(blow).toPrecision(2)} N s
     {stepS !== undefined && `, from the step at about ${stepS.toFixed(3)} s after the first`}</p>;
 }
 
@@ -69,8 +65,8 @@ function Blows() {
   return <section class="blows"><h2>Newest blows</h2><Origin /><table><thead><tr><th title="on the clock of the daemon’s sound">at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
     <tbody>{live.blows.value.slice(0, 12).map((seen) => [seen, seen.blow] as const).map(([seen, blow]) => <tr>
       <td><button class="inline" onClick={() => { live.chosen.value = seen; }}>{blow.timeS.toFixed(3)}</button></td><td>{blow.object}</td>
-      <td>{striker(blow)}</td>
-      <td>{size(blow.impulseNewtonSeconds).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
+      <td>{strikerOf(blow)}</td>
+      <td>{newtonSeconds(blow).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
 }
 
 export function LivePage() {

@@ -3,7 +3,7 @@
 import type { ComponentChildren } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { effect } from '@preact/signals';
-import type { Blow } from './gen/carillon/v1/audio_service_pb';
+import { newtonSeconds, strikerOf } from './blow_text';
 import { COLORS, LiveView } from './live_view';
 import type { SurfaceOf } from './live_view';
 import * as trace from './trace_state';
@@ -12,8 +12,6 @@ const LEFT = 110, WAVE_HEIGHT = 60, ROW_HEIGHT = 22;
 /** How long before the playhead a blow is still shown on its body, s. */
 const RECENT_S = 0.15;
 const STEP_S = 0.1;
-
-const newtonSeconds = ({ impulseNewtonSeconds: impulse }: Blow) => Math.hypot(impulse?.x ?? 0, impulse?.y ?? 0, impulse?.z ?? 0);
 
 function Bodies({ surfaceOf }: { surfaceOf: SurfaceOf }) {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -102,7 +100,7 @@ function Blows() {
   const name = (handle: number) => one!.labels.get(handle) ?? `body ${handle}`;
   return <section class="blows"><h2>Blows about the playhead</h2><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
     <tbody>{near.map((blow) => <tr><td><button class="inline" onClick={() => trace.seek(blow.timeS)}>{blow.timeS.toFixed(3)}</button></td>
-      <td>{name(blow.object)}</td><td>{blow.striker.case === 'otherObject' ? name(blow.striker.value) : blow.striker.case === 'partner' ? `#${blow.striker.value}` : ''}</td>
+      <td>{name(blow.object)}</td><td>{strikerOf(blow, name)}</td>
       <td>{newtonSeconds(blow).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
 }
 

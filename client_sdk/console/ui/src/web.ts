@@ -8,6 +8,7 @@ import { StreamContactsRequestSchema } from './gen/carillon/v1/contact_service_p
 import type { StreamContactsRequest, StreamContactsResponse } from './gen/carillon/v1/contact_service_pb';
 import { JobState } from './gen/carillon/v1/decomposition_pb';
 import type { NewObjectSchema } from './gen/carillon/v1/scene_service_pb';
+import { Outbox } from './outbox';
 import { Player } from './player';
 import { servicesOf } from './services';
 import type { Services } from './services';
@@ -92,11 +93,10 @@ export class SoundingScene {
   report?: StreamContactsResponse;
   /** Rejects with a ConnectError when the stream is lost, for example with the daemon; the page then makes a new scene. */
   readonly ended: Promise<void>;
-  private readonly waiting: StreamContactsRequest[];
-  private wake = () => {};
+  private readonly requests: Outbox<StreamContactsRequest>;
 
   constructor(private readonly services: Services, readonly name: string, stepS: number) {
-    this.waiting = [create(StreamContactsRequestSchema, { start: { scene: name, stepS, frame: Frame.SCENE } })];
+    this.requests = new Outbox(create(StreamContactsRequestSchema, { start: { scene: name, stepS, frame: Frame.SCENE } }));
     this.ended = this.read();
   }
 
@@ -108,20 +108,11 @@ export class SoundingScene {
 
   /** Sends a step of the simulation. */
   step(timeS: number, { contacts = [], poses }: StepContents): void {
-    this.waiting.push(create(StreamContactsRequestSchema, { steps: [{ timeS, contacts: contacts.map(toContact),
+    this.requests.push(create(StreamContactsRequestSchema, { steps: [{ timeS, contacts: contacts.map(toContact),
       poses: poses && { object: poses.objects, positionM: poses.positions.flat(), orientation: poses.orientations.flat() } }] }));
-    this.wake();
-  }
-
-  private async* requests() {
-    for (;;) {
-      const next = this.waiting.shift();
-      if (next) yield next;
-      else await new Promise<void>((resolve) => { this.wake = resolve; });
-    }
   }
 
   private async read(): Promise<void> {
-    for await (const report of this.services.contacts.streamContacts(this.requests())) this.report = report;
+    for await (const report of this.services.contacts.streamContacts(this.requests)) this.report = report;
   }
 }

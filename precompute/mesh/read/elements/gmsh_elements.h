@@ -31,8 +31,8 @@ absl::Status UnknownGmshKind(int type);
 struct GmshElements {
   /// Adds an element to the file and to its physical groups. A group is identified by its name. A
   /// group without a name is identified by its number, unless it contains volumes, because numbers
-  /// of volumes stand for materials. Zero means no group. In MSH 2.2 Gmsh writes an element once
-  /// for each of its groups, one after the other; such an element is added once.
+  /// of volumes stand for materials. Zero means no group. In MSH 2.2 Gmsh repeats an element for
+  /// each of its groups, in lines that follow one another; the mesh gets it once.
   absl::Status Add(const GmshKind& kind, std::span<const int32_t> physicals,
                    std::span<const int64_t> nodes);
 
