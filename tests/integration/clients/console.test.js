@@ -556,7 +556,7 @@ test('the models are listed with their pictures, and the space bar lets one be h
   await page.getByLabel('Label').fill('bar');
   await page.locator('.models').focus();
   await page.keyboard.press('Space');
-  await page.waitForFunction(() => carillonConsole.state.row.value && carillonConsole.state.mixer.value.activeModeCount > 0);
+  await page.waitForFunction(() => carillonConsole.state.row.value && carillonConsole.state.mixer.value?.activeModeCount > 0);
   await keepPicture(page, 'console_models.png');
   assert.deepEqual(await accessibilityFaults(page), []);
 }));
