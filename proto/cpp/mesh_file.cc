@@ -65,9 +65,22 @@ absl::StatusOr<std::string> ReadOne(const std::filesystem::path& path) {
   return bytes;
 }
 
-absl::StatusOr<std::string> ReadTetgen(std::filesystem::path path) {
-  ASSIGN_OR_RETURN(const std::string nodes, ReadOne(path.replace_extension(".node")));
-  const std::filesystem::path elements = path.replace_extension(".ele");
+/// Returns the path of the file with that suffix beside `path`, also if its name is in capitals.
+std::filesystem::path Beside(std::filesystem::path path, const char* suffix) {
+  path.replace_extension(suffix);
+  if (std::filesystem::exists(path)) return path;
+  std::error_code unreadable;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           path.has_parent_path() ? path.parent_path() : ".", unreadable)) {
+    const std::filesystem::path& other = entry.path();
+    if (absl::EqualsIgnoreCase(other.filename().string(), path.filename().string())) return other;
+  }
+  return path;
+}
+
+absl::StatusOr<std::string> ReadTetgen(const std::filesystem::path& path) {
+  ASSIGN_OR_RETURN(const std::string nodes, ReadOne(Beside(path, ".node")));
+  const std::filesystem::path elements = Beside(path, ".ele");
   // One file may contain both already.
   if (!std::filesystem::exists(elements)) return nodes;
   ASSIGN_OR_RETURN(const std::string rest, ReadOne(elements));
@@ -222,10 +235,10 @@ absl::StatusOr<std::string> ReadInp(const std::filesystem::path& path) {
 
 absl::StatusOr<std::string> ReadAnyFormat(const std::filesystem::path& path,
                                           const std::string& format) {
-  const std::filesystem::path suffix = path.extension();
+  const std::string suffix = absl::AsciiStrToLower(path.extension().string());
   if (format == "node" && (suffix == ".node" || suffix == ".ele")) return ReadTetgen(path);
   if (format == "inp") return ReadInp(path);
-  const bool has_buffers = format == "gltf" && absl::EqualsIgnoreCase(suffix.string(), ".gltf");
+  const bool has_buffers = format == "gltf" && suffix == ".gltf";
   return has_buffers ? ReadGltf(path) : ReadOne(path);
 }
 

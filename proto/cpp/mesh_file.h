@@ -15,7 +15,7 @@ std::string MeshFormatOf(const std::string& path);
 /// to it.
 ///
 ///   - For the format "node" it returns TetGen's .node file followed by the .ele file, whichever of
-///     them `path` names, unless one file contains both already.
+///     them `path` names, also in capitals, unless one file contains both already.
 ///   - For a file *.gltf it returns the document with the data of its buffers in it. Their files
 ///     must be in the folder of `path` or below it.
 ///   - For the format "inp" it returns the file with those that it includes (*INCLUDE, and *NODE,

@@ -244,6 +244,12 @@ class MeshFilesTest(unittest.TestCase):
         with self.assertRaises(FileNotFoundError):
             self.read(b"*INCLUDE, INPUT=gone.inc\n")
 
+    def test_the_two_files_of_tetgen_may_have_names_in_capitals(self):
+        (self.folder / "BODY.NODE").write_text("nodes\n")
+        (self.folder / "BODY.ELE").write_text("elements\n")
+        for name in ("BODY.NODE", "BODY.ELE"):
+            self.assertEqual(carillon.meshes.read_mesh(self.folder / name).data, b"nodes\nelements\n")
+
 
 if __name__ == "__main__":
     unittest.main()

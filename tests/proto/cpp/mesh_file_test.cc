@@ -120,6 +120,13 @@ TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOne) {
   EXPECT_EQ(*ReadMeshFile((folder_ / "body.node").string(), "node"), "nodes");
 }
 
+TEST_F(MeshFile, TheTwoFilesOfTetgenMayHaveNamesInCapitals) {
+  Write("BODY.ELE", "elements\n");
+  const std::string nodes = Write("BODY.NODE", "nodes");
+  EXPECT_EQ(*ReadMeshFile(nodes, "node"), "nodes\nelements\n");
+  EXPECT_EQ(*ReadMeshFile((folder_ / "BODY.ELE").string(), "node"), "nodes\nelements\n");
+}
+
 TEST_F(MeshFile, WhatIsNoFileOrEmptyIsRefused) {
   EXPECT_THAT(ReadMeshFile(folder_.string(), "obj").status().ToString(),
               AllOf(HasSubstr("FILE_NOT_FOUND: "), HasSubstr("Is a directory")));

@@ -34,15 +34,22 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
     """
     file = pathlib.Path(path)
     mesh_format = file.suffix.lstrip(".").lower()
-    if mesh_format in ("node", "ele") and file.with_suffix(".ele").exists():
-        nodes = file.with_suffix(".node").read_bytes()
-        return MeshFile(nodes.rstrip(b"\n") + b"\n" + file.with_suffix(".ele").read_bytes(), "node", file.stem)
+    if mesh_format in ("node", "ele") and (elements := _with_suffix(file, ".ele")).exists():
+        nodes = _with_suffix(file, ".node").read_bytes()
+        return MeshFile(nodes.rstrip(b"\n") + b"\n" + elements.read_bytes(), "node", file.stem)
     data = file.read_bytes()
     if mesh_format == "gltf":
         data = _with_buffers(file, data)
     elif mesh_format == "inp":
         data = _with_includes(file, data)
     return MeshFile(data, mesh_format, file.stem)
+
+
+def _with_suffix(file: pathlib.Path, suffix: str) -> pathlib.Path:
+    """The file of the same name with that suffix, also if its name is in capitals."""
+    exact = file.with_suffix(suffix)
+    same = [other for other in file.parent.iterdir() if other.name.lower() == exact.name.lower()]
+    return exact if exact in same or not same else same[0]
 
 
 _INPUT = re.compile(rb"""^[ \t]*\*(?:(INCLUDE)|(?:NODE|ELEMENT|NSET|ELSET))[ \t]*(?:,[^,\n]*)*?

@@ -15,6 +15,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "precompute/mesh/read/elements/inp_kind.h"
 #include "precompute/mesh/read/elements/inp_lines.h"
 #include "precompute/mesh/read/elements/inp_model.h"
@@ -43,6 +44,12 @@ constexpr std::string_view kInpRefused[] = {"NGEN",
                                             "ROTARY INERTIA",
                                             "MODEL CHANGE",
                                             "PARAMETER"};
+/// A material of the file, with the lines that state its elasticity and density.
+struct StatedMaterial {
+  std::string name;
+  std::vector<std::string> figures;
+};
+
 /// Conditions that change how the body vibrates, and that the settings of a model give instead.
 constexpr std::string_view kInpConditions[] = {"BOUNDARY", "EQUATION",   "MPC",
                                                "COUPLING", "RIGID BODY", "TIE"};
@@ -65,6 +72,7 @@ class InpParser {
     RETURN_IF_ERROR(EndBlock());
     std::vector<InpBody> bodies = TakeBodies();
     for (InpBody& body : bodies) WarnOfSolidSections(body.scope);
+    WarnOfMaterials();
     ASSIGN_OR_RETURN(ElementFile file, JoinBodies(std::move(bodies), assembly_sets_));
     file.warnings = std::move(warnings_);
     return file;
@@ -111,6 +119,7 @@ class InpParser {
     if (keyword_.name == "NODE") return BeginNodes();
     if (keyword_.name == "ELEMENT") return BeginElements();
     if (keyword_.name == "SOLID SECTION") return TakeSection();
+    if (keyword_.name == "MATERIAL") materials_.push_back({keyword_.Of("NAME"), {}});
     if (keyword_.name.ends_with(" SECTION")) WarnOfSection();
     return absl::OkStatus();
   }
@@ -135,6 +144,17 @@ class InpParser {
     warnings_.push_back(absl::StrCat("*", keyword_.name, " of the file (", lines_.place(),
                                      ") is not used: the faces only bound a solid body; --wall "
                                      "makes a closed surface hollow"));
+  }
+
+  /// The request gives the materials, because a file states no loss factors, and figures in units
+  /// that it does not name.
+  void WarnOfMaterials() {
+    for (const auto& [name, figures] : materials_) {
+      if (figures.empty()) continue;
+      warnings_.push_back(absl::StrCat("the figures of the file's material ", QuotedText(name),
+                                       " (", absl::StrJoin(figures, "; "),
+                                       ") are not used, but those of the given material"));
+    }
   }
 
   void WarnOfSolidSections(InpScope& scope) {
@@ -209,7 +229,18 @@ class InpParser {
     if (keyword_.name == "SURFACE" && !fields.empty()) return TakeSurface(fields);
     if (keyword_.name == "INSTANCE") return TakePlace(fields);
     if (keyword_.name == "SYSTEM") return TakeSystem(fields);
+    TakeFigures(fields);
     return absl::OkStatus();
+  }
+
+  /// The first line of a material's elasticity or density, as the file writes it.
+  void TakeFigures(const std::vector<std::string_view>& fields) {
+    const bool is_figure = keyword_.name == "ELASTIC" || keyword_.name == "DENSITY";
+    if (!is_figure || data_lines_ > 1 || materials_.empty()) return;
+    std::string figures = absl::StrCat("*", keyword_.name);
+    if (keyword_.Has("TYPE")) absl::StrAppend(&figures, ", TYPE=", keyword_.Of("TYPE"));
+    for (size_t i = 0; i < fields.size(); ++i) figures.append(i > 0 ? ", " : " ").append(fields[i]);
+    materials_.back().figures.push_back(EscapedText(figures.substr(0, 90)));
   }
 
   absl::Status EndBlock() const {
@@ -473,6 +504,7 @@ class InpParser {
   std::map<std::string, InpScope> parts_;
   std::vector<std::unique_ptr<InpBody>> instances_;
   std::vector<InpAssemblySet> assembly_sets_;
+  std::vector<StatedMaterial> materials_;
   InpScope* scope_ = &model_;  // to which the lines belong that are being read
   InpKeyword keyword_;
   int data_lines_ = 0;            // of the current block so far

@@ -210,6 +210,20 @@ TEST_F(ReadInpTest, SectionsThatAreNotUsedAreNamed) {
                                            HasSubstr("\"Heda\" is not used, because the set is")));
 }
 
+TEST_F(ReadInpTest, FiguresOfMaterialsThatAreNotUsedAreNamed) {
+  const absl::StatusOr<NamedMesh> read =
+      ReadNamed(std::string(kNodes) + kElement +
+                    "*MATERIAL, NAME=Steel\n*DENSITY\n7.85e-9,\n*ELASTIC\n"
+                    " 210000., .3, 20.\n190000., .3, 300.\n*DAMPING, BETA=1e-6\n"
+                    "*Material, name=Air\n",
+                "inp");
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_THAT(
+      read->warnings,
+      ElementsAre("the figures of the file's material \"Steel\" (*DENSITY 7.85e-9; *ELASTIC "
+                  "210000., .3, 20.) are not used, but those of the given material"));
+}
+
 TEST_F(ReadInpTest, ShellsBesideTheTetrahedraAreNamed) {
   const absl::StatusOr<NamedMesh> read = ReadNamed(
       std::string(kNodes) + "5, 9,9,9\n" + kElement + "*ELEMENT, TYPE=S3\n2, 1,2,3\n3, 1,2,5\n",
