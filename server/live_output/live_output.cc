@@ -10,9 +10,7 @@
 namespace carillon {
 namespace {
 
-/// A listener gets its blocks after at most the first of these periods.
-constexpr std::chrono::milliseconds kHousekeepingPeriod(5);
-constexpr std::chrono::milliseconds kUnheardPeriod(20);
+constexpr std::chrono::milliseconds kHousekeepingPeriod(20);
 constexpr std::chrono::milliseconds kPausePeriod(100);
 /// Peak and loudness are sampled every kLevelPeriod. The peak is the maximum over kPeakMemory.
 constexpr std::chrono::milliseconds kLevelPeriod(50);
@@ -90,6 +88,8 @@ void LiveOutput::RenderBlock(std::span<float> block) {
   mixer_.Render(block);
   final_fade_.Apply(block);
   broadcast_.Publish(first_frame, block);
+  // Listeners get the block at once. This wakes the housekeeping thread and waits for nothing.
+  if (heard_.load(std::memory_order_relaxed)) woken_.release();
 }
 
 absl::StatusOr<std::unique_ptr<BlockBroadcast::Listener>> LiveOutput::Listen(
@@ -128,9 +128,11 @@ bool LiveOutput::KeepPace() {
   return paused_;
 }
 
-bool LiveOutput::MayPause() const {
-  return mixer_.resting() && broadcast_.listener_count() == 0 && !stems_.has_listeners();
+bool LiveOutput::IsHeard() const {
+  return broadcast_.listener_count() > 0 || stems_.has_listeners();
 }
+
+bool LiveOutput::MayPause() const { return mixer_.resting() && !IsHeard(); }
 
 void LiveOutput::Pause() {
   // Blocks that are rendered while the threads stop count as rendered in the pause.
@@ -228,12 +230,8 @@ void LiveOutput::KeepHouse() {
       NoteLosses();
       losses_due = now + kLossPeriod;
     }
-    if (KeepPace()) {
-      woken_.try_acquire_for(kPausePeriod);
-    } else {
-      const bool heard = broadcast_.listener_count() > 0 || stems_.has_listeners();
-      clock_.SleepUntil(clock_.Monotonic() + (heard ? kHousekeepingPeriod : kUnheardPeriod));
-    }
+    heard_ = IsHeard();
+    woken_.try_acquire_for(KeepPace() ? kPausePeriod : kHousekeepingPeriod);
   }
 }
 

@@ -122,6 +122,7 @@ class LiveOutput {
   void Wake();
   /// Begins or ends a pause, and renders what is due in it. Returns whether rendering pauses.
   bool KeepPace();
+  bool IsHeard() const;
   bool MayPause() const;
   void Pause() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
   void Resume() ABSL_EXCLUSIVE_LOCKS_REQUIRED(pause_mutex_);
@@ -149,7 +150,8 @@ class LiveOutput {
   std::chrono::nanoseconds paused_at_ ABSL_GUARDED_BY(pause_mutex_){};
   uint64_t paused_frame_ ABSL_GUARDED_BY(pause_mutex_) = 0;
   std::vector<float> silence_ ABSL_GUARDED_BY(pause_mutex_);
-  std::counting_semaphore<> woken_{0};
+  std::counting_semaphore<> woken_{0};  ///< ends a wait of the housekeeping thread
+  std::atomic<bool> heard_{false};      ///< whether rendering wakes it
   mutable Mutex mutex_;
   OutputVolume volume_ ABSL_GUARDED_BY(mutex_);
   struct Peak {

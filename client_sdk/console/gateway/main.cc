@@ -28,7 +28,12 @@ using carillon::console::Upstream;
 void Accept(tcp::acceptor& acceptor, const std::shared_ptr<Console>& console) {
   acceptor.async_accept([&acceptor, console](boost::system::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error) std::make_shared<HttpConnection>(std::move(socket), console)->Run();
+    if (!error) {
+      // A block of sound must not wait for the browser's acknowledgement of the one before, which
+      // may take 40 ms.
+      socket.set_option(tcp::no_delay(true), error);
+      std::make_shared<HttpConnection>(std::move(socket), console)->Run();
+    }
     Accept(acceptor, console);
   });
 }

@@ -9,7 +9,7 @@ declare const registerProcessor: (name: string, processor: unknown) => void;
 declare class AudioWorkletProcessor { readonly port: MessagePort; }
 
 const TAPS = 32, PHASES = 512;
-const FIRST_TARGET = 768, LEAST_TARGET = 512, MORE = 256;
+const FIRST_TARGET = 512, LEAST_TARGET = 512, MORE = 256;
 const MOST_RATIO_CHANGE = 0.004, GAIN = 2e-6, SMOOTHING = 0.02;
 /** Frames beyond the target that are left out at once: the ratio would take minutes. */
 const MOST_EXCESS = 4096;

@@ -41,6 +41,8 @@ async function strikeAndShow(at: Strike): Promise<void> {
   if (!sounding.value) soundByGesture();
   await soundReady();
   state.sendStrike(at);
+  // What is drawn anew waits until the strike is on its way.
+  await new Promise((resolve) => setTimeout(resolve));
   state.strike.value = at;
   view?.mark(at);
   const row = await state.readRow(at);
