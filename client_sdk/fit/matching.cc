@@ -63,8 +63,11 @@ double Normal(double deviation, double scatter) {
   return std::exp(-x * x / 2) / (scatter * std::sqrt(2 * std::numbers::pi));
 }
 
-/// Returns the log likelihood of a body's lines, against lines that no body explains.
-double BodyScore(const std::vector<double>& measured, const LogLines& lines, double log_speed) {
+/// Returns the log likelihood of a body's lines, against lines that no body explains. `deviations`
+/// has, for each line, how far it is from the one mode that it is matched to, or nothing; if it is
+/// null, all modes near a line may explain it, and others, too.
+double BodyScore(const std::vector<double>& measured, const LogLines& lines, double log_speed,
+                 const std::vector<std::optional<double>>* deviations) {
   const double low = measured.front() - kBelowBand, high = measured.back() + kAboveBand;
   const double width = high - low;
   const double all_false = static_cast<double>(measured.size()) / width;
@@ -80,16 +83,24 @@ double BodyScore(const std::vector<double>& measured, const LogLines& lines, dou
   double expected = kSeen * static_cast<double>(position(high) - position(low)) +
                     kSeen * uppermost * beyond + background * width;
   std::array<double, kScatters.size()> scores = {};
-  for (const double log_hz : measured) {
+  for (size_t i = 0; i < measured.size(); ++i) {
+    const double log_hz = measured[i];
     double elsewhere = background, tails = 0;
     std::array<double, kScatters.size()> near = {};
     if (log_hz > complete_to) elsewhere += kSeen * uppermost;
-    for (auto j = position(log_hz - 4 * kTailScatter);
-         j < std::ssize(own) && own[static_cast<size_t>(j)] + log_speed < log_hz + 4 * kTailScatter;
-         ++j) {
-      const double deviation = log_hz - own[static_cast<size_t>(j)] - log_speed;
+    const auto add = [&](double deviation) {
       tails += Normal(deviation, kTailScatter);
       for (size_t s = 0; s < near.size(); ++s) near[s] += Normal(deviation, kScatters[s]);
+    };
+    if (deviations != nullptr) {
+      if ((*deviations)[i]) add(*(*deviations)[i]);
+    } else {
+      for (auto j = position(log_hz - 4 * kTailScatter);
+           j < std::ssize(own) &&
+           own[static_cast<size_t>(j)] + log_speed < log_hz + 4 * kTailScatter;
+           ++j) {
+        add(log_hz - own[static_cast<size_t>(j)] - log_speed);
+      }
     }
     for (size_t s = 0; s < near.size(); ++s) {
       const double modes = (1 - kTailPart) * near[s] + kTailPart * tails;
@@ -118,8 +129,6 @@ class Matcher {
       for (const double hz : body.frequencies_hz) logs.push_back(std::log(hz));
     }
   }
-
-  double Score(double log_speed, double nu) const { return Score(AllLinesAt(nu), log_speed, nu); }
 
   /// The greatest values over the grid, the greatest first, not near each other.
   std::vector<Match> Peaks() const {
@@ -160,7 +169,7 @@ class Matcher {
     double sum = 0;
     for (const MatchedLine& line : match.lines) sum += line.deviation * line.deviation;
     match.rms = match.lines.empty() ? 0 : std::sqrt(sum / static_cast<double>(match.lines.size()));
-    match.score = Score(std::log(match.speed_m_per_s), match.poisson_ratio);
+    match.score = MatchedScore(match);
   }
 
   void FindErrors(Match& match) const {
@@ -199,7 +208,22 @@ class Matcher {
   double Score(const std::vector<LogLines>& lines, double log_speed, double nu) const {
     double score = PriorOf(nu, settings_);
     for (size_t b = 0; b < bodies_.size(); ++b) {
-      if (!measured_[b].empty()) score += BodyScore(measured_[b], lines[b], log_speed);
+      if (!measured_[b].empty()) score += BodyScore(measured_[b], lines[b], log_speed, nullptr);
+    }
+    return score;
+  }
+
+  /// The score with each line matched to one mode at most.
+  double MatchedScore(const Match& match) const {
+    const std::vector<LogLines> lines = AllLinesAt(match.poisson_ratio);
+    const double log_speed = std::log(match.speed_m_per_s);
+    double score = PriorOf(match.poisson_ratio, settings_);
+    for (size_t b = 0; b < bodies_.size(); ++b) {
+      std::vector<std::optional<double>> deviations(measured_[b].size());
+      for (const MatchedLine& line : match.lines) {
+        if (line.body == b) deviations[line.measured] = line.deviation;
+      }
+      if (!measured_[b].empty()) score += BodyScore(measured_[b], lines[b], log_speed, &deviations);
     }
     return score;
   }

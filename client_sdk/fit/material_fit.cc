@@ -15,11 +15,9 @@ namespace {
 
 constexpr size_t kFewestModes = 5;
 constexpr double kLeastLogOdds = 4;
-/// Lines that match the mesh of another body by chance are some 0.5 % apart, so that the log odds
-/// must be the greater, the nearer a match comes to that,
-constexpr double kGoodRms = 0.0035, kLogOddsPerRms = 3500;
-/// and the greater, the larger the part of the lines that no mode explains, often half of them.
-constexpr double kLogOddsPerUnmatched = 16;
+/// The meshes of other bodies match by chance, but then they leave half of the lines or more, so
+/// that the log odds must be the greater, the larger the part of the lines that no mode explains.
+constexpr double kLogOddsPerUnmatched = 5;
 constexpr double kMostRms = 0.01;
 /// Part of the measured lines that must be modes of the body.
 constexpr double kLeastMatched = 0.35;
@@ -99,9 +97,7 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
             "modulus if they are known, and see that the mesh is that of the body"));
   }
   const double matched = static_cast<double>(best.lines.size()) / static_cast<double>(line_count);
-  const double beyond = std::max(0.0, best.rms - kGoodRms);
-  const double least =
-      kLeastLogOdds + kLogOddsPerRms * beyond + kLogOddsPerUnmatched * (1 - matched);
+  const double least = kLeastLogOdds + kLogOddsPerUnmatched * (1 - matched);
   if (odds < least || best.rms > kMostRms || matched < kLeastMatched) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MESH_DISAGREES",

@@ -70,6 +70,22 @@ TEST(FindMatches, OfTwoLinesNearAModeTheLouderIsMatched) {
   }
 }
 
+TEST(FindMatches, AModeExplainsNoMoreThanOneLine) {
+  const MatchSettings settings{.least_speed_m_per_s = 0.98 * kSpeed_m_per_s,
+                               .most_speed_m_per_s = 1.02 * kSpeed_m_per_s,
+                               .poisson_ratio = kNu};
+  MeasuredBody body = Measured({0, 1, 2, 3, 4, 5, 6}, {});
+  const double alone = FindMatches({body}, settings)[0].score;
+  for (const double hz : Measured({0, 1, 2, 3, 4, 5, 6}, {}).frequencies_hz) {
+    body.frequencies_hz.push_back(1.001 * hz);
+    body.frequency_errors_hz.push_back(1);
+  }
+  std::ranges::sort(body.frequencies_hz);
+  const Match twice = FindMatches({body}, settings)[0];
+  EXPECT_EQ(twice.lines.size(), 7U);
+  EXPECT_LT(twice.score, alone);
+}
+
 TEST(FindMatches, AGivenRatioIsKept) {
   const std::vector<Match> matches =
       FindMatches({Measured({0, 1, 2, 3, 4, 5, 6}, {})}, {.poisson_ratio = 0.34});

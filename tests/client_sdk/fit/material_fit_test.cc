@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "tests/client_sdk/fit/struck_body.h"
@@ -85,18 +87,26 @@ TEST(FitMaterial, RefusesFewLinesAndThoseOfAnotherBody) {
                              HasSubstr("TOO_FEW_MODES")));
 }
 
-TEST(FitMaterial, AsksForTheMoreOddsTheFartherApartTheLinesAre) {
+TEST(FitMaterial, AsksForTheMoreOddsTheMoreLinesNoModeExplains) {
   size_t refused = 0, accepted = 0;
-  for (const size_t lines : {6U, 8U, 10U, 12U, 16U}) {
-    for (const double apart : {0.002, 0.005, 0.006, 0.007, 0.008}) {
-      const auto fit = FitMaterial({Body(lines, false, apart)}, {.density_kg_per_m3 = kDensity});
-      ++(fit.ok() ? accepted : refused);
-      if (fit.ok()) {
-        EXPECT_GE(fit->log_odds, 4 + 3500 * (fit->rms - 0.0035)) << lines << " lines, " << apart;
+  for (const size_t lines : {5U, 6U, 7U, 8U}) {
+    for (const size_t others : {0U, 4U, 8U, 12U}) {
+      FittedBody body = Body(lines);
+      for (size_t k = 0; k < others; ++k) {
+        MeasuredMode other = body.modes[0];
+        other.frequency_hz *= std::exp(0.17 * static_cast<double>(k + 1));
+        body.modes.push_back(other);
       }
+      std::ranges::sort(body.modes, {}, &MeasuredMode::frequency_hz);
+      const auto fit = FitMaterial({body}, {.density_kg_per_m3 = kDensity});
+      ++(fit.ok() ? accepted : refused);
+      if (!fit.ok()) continue;
+      const auto all = static_cast<double>(lines + others);
+      EXPECT_GE(fit->log_odds, 4 + 5 * (1 - static_cast<double>(fit->matched_count) / all)) << all;
+      EXPECT_NEAR(fit->young_pa / kYoung_pa, 1, 0.01) << lines << " lines, " << others;
     }
   }
-  EXPECT_GT(refused, 0U);
+  EXPECT_GT(refused, 3U);
   EXPECT_GT(accepted, 5U);
 }
 
