@@ -8,7 +8,7 @@
 #include <random>
 #include <utility>
 
-#include "client_sdk/fit/poisson_change.h"
+#include "proto/cpp/poisson_change.h"
 
 namespace carillon::fit {
 namespace {

@@ -10,6 +10,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
+#include "proto/cpp/poisson_change.h"
 #include "proto/cpp/status_macros.h"
 #include "server/synthesis/bank/level.h"
 
@@ -19,9 +20,6 @@ namespace {
 constexpr double kSmallestSize = 0.001;
 constexpr double kLargestSize = 1000;
 constexpr double kLargestGain = 1000;
-/// Models round Poisson's ratio to 1e-4. The remainder allows for the rounding of the difference.
-constexpr double kPoissonTolerance = 1.0001e-4;
-
 /// Largest relative difference of two factors that count as the same.
 constexpr double kSameFactor = 1e-6;
 
@@ -76,7 +74,7 @@ absl::Status MatchRegions(const ModalModel& model, SoundingMaterial& material) {
     const double poisson_ratio = one.poisson_ratio.value_or(region.poisson_ratio);
     if (IsSame(young_pa, material.young_pa) &&
         IsSame(density_kg_per_m3, material.density_kg_per_m3) &&
-        std::abs(poisson_ratio - region.poisson_ratio) <= kPoissonTolerance) {
+        ServesPoissonRatio(region.poisson_ratio, poisson_ratio, false)) {
       continue;
     }
     return Differs(absl::StrCat(
@@ -122,12 +120,13 @@ absl::Status Check(const ModalModel& model, const ObjectProperties& properties) 
   if (properties.pose) RETURN_IF_ERROR(Validate(*properties.pose));
   if (!model.regions.empty()) return absl::OkStatus();  // each region has its ratio
   const double wanted = properties.poisson_ratio.value_or(model.poisson_ratio);
-  if (std::abs(wanted - model.poisson_ratio) <= kPoissonTolerance) return absl::OkStatus();
+  const bool has_slopes = !model.poisson_slopes.empty();
+  if (ServesPoissonRatio(model.poisson_ratio, wanted, has_slopes)) return absl::OkStatus();
   absl::Status status = Refusal(
       absl::StatusCode::kFailedPrecondition, "POISSON_RATIO_DIFFERS",
       absl::StrCat(
           "the material's Poisson's ratio is ", wanted, " but the modal model was computed for ",
-          model.poisson_ratio,
+          model.poisson_ratio, has_slopes ? ", which is too far away" : "",
           "; create a modal model with the material's, or set poisson_ratio to the model's"));
   AddFigure(status, "model_poisson_ratio", absl::StrCat(model.poisson_ratio));
   return status;
@@ -206,14 +205,26 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
   return complete_hz;
 }
 
+/// Returns the eigenvalues of the model for the Poisson's ratio of an object, mode by mode; they
+/// may cross each other.
+std::vector<double> EigenvaluesFor(const ModalModel& model, const ObjectProperties& properties) {
+  std::vector<double> eigenvalues = model.eigenvalues;
+  if (model.poisson_slopes.empty() || !properties.poisson_ratio) return eigenvalues;
+  for (size_t m = 0; m < eigenvalues.size(); ++m) {
+    eigenvalues[m] *=
+        EigenvalueChange(model.poisson_slopes[m], model.poisson_ratio, *properties.poisson_ratio);
+  }
+  return eigenvalues;
+}
+
 /// Returns the modes with which an object sounds. A small hard body whose modes are all too high to
 /// be heard may still click. Errors: FailedPrecondition (NO_MODE_IN_BAND).
 absl::StatusOr<SoundingModes> SelectModes(const ModalModel& model,
                                           const ObjectProperties& properties,
                                           const Transfer* transfer, double sample_rate_hz,
                                           const SoundingBand& band) {
-  const ModeTable table{model.eigenvalues, model.couplings, RadiationOf(transfer),
-                        EnergyPartsOf(model)};
+  const std::vector<double> eigenvalues = EigenvaluesFor(model, properties);
+  const ModeTable table{eigenvalues, model.couplings, RadiationOf(transfer), EnergyPartsOf(model)};
   SoundingModes sounding = SelectSoundingModes(table, properties.material, sample_rate_hz, band);
   if (!sounding.modes.empty() || Clicks(transfer, properties)) return sounding;
   return NoModeInBand(model, properties.material, band);
@@ -232,11 +243,13 @@ std::shared_ptr<const YieldingModes> YieldingModesOf(const SoundingModes& soundi
 }
 
 double LowestHz(const std::vector<SoundingMode>& modes) {
-  return modes.empty() ? 0 : modes.front().natural_frequency_hz;
+  if (modes.empty()) return 0;
+  return std::ranges::min(modes, {}, &SoundingMode::natural_frequency_hz).natural_frequency_hz;
 }
 
 double HighestHz(const std::vector<SoundingMode>& modes) {
-  return modes.empty() ? 0 : modes.back().natural_frequency_hz;
+  if (modes.empty()) return 0;
+  return std::ranges::max(modes, {}, &SoundingMode::natural_frequency_hz).natural_frequency_hz;
 }
 
 }  // namespace

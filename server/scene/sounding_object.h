@@ -32,7 +32,8 @@ enum class RadiationModel {
 /// Material, loudness, place and radiation of an object.
 struct ObjectProperties {
   SoundingMaterial material;  ///< its size is relative to the model's
-  /// Poisson's ratio of the material. If present, it must agree with the model's.
+  /// Poisson's ratio of the material. If present, it must be one that the model serves; see
+  /// ServesPoissonRatio.
   std::optional<double> poisson_ratio;
   double gain = 1;                          ///< linear
   std::optional<Pose> pose = std::nullopt;  ///< the newest pose

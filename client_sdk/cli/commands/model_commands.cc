@@ -19,14 +19,12 @@
 #include "proto/cpp/fixture_text.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/mesh_file.h"
+#include "proto/cpp/poisson_change.h"
 #include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
 
 namespace carillon::cli {
 namespace {
-
-/// As the daemon has it: how far the Poisson's ratio of a material may be from that of a model.
-constexpr double kPoissonTolerance = 1.0001e-4;
 
 const char* ElementName(v1::Element element) {
   return element == v1::ELEMENT_LINEAR ? "linear" : "quadratic";
@@ -135,7 +133,8 @@ void WarnOfMaterial(const v1::ModalModelSummary& model, const v1::Material& mate
   if (!wanted.ok()) return;  // the daemon says why
   const double poisson = model.header().settings().poisson_ratio();
   if (wanted->has_poisson_ratio() &&
-      std::abs(wanted->poisson_ratio() - poisson) > kPoissonTolerance) {
+      !ServesPoissonRatio(poisson, wanted->poisson_ratio(),
+                          model.header().poisson_slopes_size() > 0)) {
     absl::FPrintF(
         stderr,
         "warning: the material's Poisson's ratio is %.4g, and the model was made for %.4g: "

@@ -31,6 +31,8 @@ struct ModalModel {
   double complete_to_eigenvalue = 0;
   std::vector<double> eigenvalues;  ///< #m, ascending
   std::vector<double> couplings;    ///< #m
+  /// #m: d ln Lambda / d nu at `poisson_ratio`, or empty in models without them.
+  std::vector<double> poisson_slopes;
   /// The sounding surface: #V vertices in metres, #T triangles, counter-clockwise from outside.
   std::vector<std::array<float, 3>> vertices;
   std::vector<std::array<uint32_t, 3>> triangles;

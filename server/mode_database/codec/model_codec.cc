@@ -131,6 +131,8 @@ void ModelDecoder::Take(const ChunkView& chunk) {
 void ModelDecoder::MakeRoom(const v1::ModalModelHeader& header) {
   model_.poisson_ratio = header.settings().poisson_ratio();
   model_.complete_to_eigenvalue = header.complete_to_eigenvalue();
+  const auto& slopes = header.poisson_slopes();
+  model_.poisson_slopes.assign(slopes.begin(), slopes.end());
   for (const v1::ModalModelRegion& region : header.regions()) {
     const v1::RegionProperties& properties = region.properties();
     const auto& strain = region.strain_energy_parts();

@@ -42,7 +42,7 @@ struct EnergyParts {
 /// The arrays of a modal model that decide how each of its modes sounds. Each array has #m numbers,
 /// one for each mode.
 struct ModeTable {
-  std::span<const double> eigenvalues;  ///< ascending, unit material
+  std::span<const double> eigenvalues;  ///< unit material
   std::span<const double> couplings;    ///< the paper's c_m, unit material
   Radiation radiation = {};
   /// One for each of SoundingMaterial::regions; empty if the body has one material.

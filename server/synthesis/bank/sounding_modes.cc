@@ -94,7 +94,10 @@ SoundingModes SelectSoundingModes(const ModeTable& table, const SoundingMaterial
                               .decay_rate_per_s = sigma,
                               .coupling = radiating.coupling});
   }
+  // Another Poisson's ratio than the model's may change the order of modes.
+  std::ranges::stable_sort(sounding.modes, {}, &SoundingMode::natural_frequency_hz);
   JoinDegenerateModes(band, sounding.modes);
+  std::ranges::sort(sounding.modes, {}, &SoundingMode::column);
   KeepMostAudible(sounding.modes, band.most_modes);
   return sounding;
 }

@@ -53,6 +53,32 @@ class Material(DaemonTest):
         self.assertGreater(self.found.residual.seconds, 1)
         self.assertEqual(carillon.fit.extract(self.taps, program=self.own["program"]).strike_count, len(PLACES))
 
+    def test_an_object_of_a_poisson_ratio_nearby_sounds_as_if_it_were_decomposed_for_it(self):
+        mesh = self.folder / "thin.obj"
+        mesh.write_bytes(meshes.obj(*meshes.box((0.12, 0.08, 0.004))))
+        figures = ("--young", YOUNG_PA, "--density", DENSITY, "--loss-factor", LOSS, "--poisson")
+
+        def create(nu):
+            self.daemon.command("model", "create", mesh, "--wait", "--without-transfer", "--label", f"thin{nu}",
+                                *figures, nu)
+
+        def apart(nu):
+            """How far the first ten modes for 0.3 are from lines of the other model's sound, relative."""
+            sound = self.folder / f"thin_{nu}.wav"
+            self.daemon.command("strike", "thin0.28", *figures, nu, "--point", "0.11,0.07,0.004", "--impulse",
+                                "0,0,-0.002", "--duration", 2e-5, "--seconds", 1.5, "--normalize", "--out", sound)
+            lines = [line.frequency_hz for line in carillon.fit.extract([sound], program=self.own["program"]).lines]
+            return max(min(abs(line / mode - 1) for line in lines) for mode in decomposed)
+
+        create(0.3)
+        create(0.28)
+        with carillon.connect(self.daemon.server) as client:
+            of_model, = (model for model in client.models() if model.label == "thin0.3")
+            decomposed = of_model.frequencies()[:10]
+        self.assertEqual(len(decomposed), 10)
+        self.assertLess(apart(0.3), 1e-3)
+        self.assertGreater(apart(0.28), 4e-3)
+
     def test_the_material_file_makes_a_model_that_sounds_as_recorded(self):
         with carillon.connect(self.daemon.server) as client:
             again = client.create_model(str(self.folder / "plate.obj"), material=self.found.material, label="again",

@@ -97,6 +97,22 @@ TEST(SceneRegistry, RefusesAnotherPoissonRatio) {
   EXPECT_TRUE(stage.scenes.AddObject(stage.scene, 0, SmallModel(), properties).ok());
 }
 
+TEST(SceneRegistry, APoissonRatioNearbyChangesEachFrequencyByItsSlope) {
+  Stage stage;
+  auto model = std::make_shared<ModalModel>(*SmallModel());
+  // Torsion, a bar's bending and a plate's: 1/(1 + nu), 1 and 1/(1 - nu^2).
+  model->poisson_slopes = {-1 / 1.33, 0, 0.66 / (1 - 0.33 * 0.33)};
+  ObjectProperties properties = SmallProperties();
+  properties.poisson_ratio = 0.27;
+  const PlacedObject placed = *stage.scenes.AddObject(stage.scene, 0, model, properties);
+  EXPECT_NEAR(placed.object.lowest_frequency_hz, 440 * std::sqrt(1.33 / 1.27), 1e-6);
+  EXPECT_NEAR(placed.object.highest_frequency_hz,
+              5000 * std::sqrt((1 - 0.33 * 0.33) / (1 - 0.27 * 0.27)), 1e-6);
+  properties.poisson_ratio = 0.25;
+  const absl::Status status = stage.scenes.AddObject(stage.scene, 0, model, properties).status();
+  EXPECT_THAT(status.ToString(), HasSubstr("POISSON_RATIO_DIFFERS: "));
+}
+
 /// SmallModel as a body of two regions, of which the soft one has most of the first mode's energy.
 std::shared_ptr<const ModalModel> ModelOfRegions() {
   auto model = std::make_shared<ModalModel>(*SmallModel());

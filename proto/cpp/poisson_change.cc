@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/fit/poisson_change.h"
+#include "proto/cpp/poisson_change.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 
-namespace carillon::fit {
+namespace carillon {
 namespace {
 
 constexpr size_t kKinds = 4;
 /// Near nu = 0 the kinds have equal slopes, and cannot be told apart.
 constexpr double kLeastSlope = 0.05;
+/// Models round the ratio to 1e-4. The remainder allows for the rounding of the difference.
+constexpr double kSame = 1.0001e-4, kFarthest = 0.07 + 1e-9;
 
 std::array<double, kKinds> Stiffnesses(double nu) {
   return {1 / (1 + nu), 1, 1 / (1 - nu * nu), (1 - nu) / ((1 + nu) * (1 - 2 * nu))};
@@ -34,4 +36,8 @@ double EigenvalueChange(double slope, double from, double to) {
   return std::max(0.05, change);
 }
 
-}  // namespace carillon::fit
+bool ServesPoissonRatio(double from, double to, bool has_slopes) {
+  return std::abs(to - from) <= (has_slopes ? kFarthest : kSame);
+}
+
+}  // namespace carillon

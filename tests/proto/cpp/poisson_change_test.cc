@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/fit/poisson_change.h"
+#include "proto/cpp/poisson_change.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace carillon::fit {
+namespace carillon {
 namespace {
 
 TEST(EigenvalueChange, IsExactForTorsionAndForTheBendingOfAPlate) {
@@ -31,4 +31,4 @@ TEST(EigenvalueChange, HasTheSlopeThatItIsGiven) {
 }
 
 }  // namespace
-}  // namespace carillon::fit
+}  // namespace carillon
