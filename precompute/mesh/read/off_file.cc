@@ -20,7 +20,8 @@ namespace {
 
 using OffWords = std::vector<std::string_view>;
 
-/// What the first word of an OFF file, "[ST][C][N][4]OFF", says of the numbers of each vertex.
+/// What the first word of an OFF file, "[ST][C][N][4]OFF", says of the numbers of each vertex. Some
+/// programs write the letters in another order, and all write the numbers in the same.
 struct OffKind {
   bool has_weight = false;
   bool has_colour = false;
@@ -42,10 +43,13 @@ std::optional<OffKind> ToOffKind(std::string_view word) {
     if (begins) word.remove_prefix(prefix.size());
     return begins;
   };
-  if (take("ST")) kind.other_count += 2;
-  kind.has_colour = take("C");
-  if (take("N")) kind.other_count += 3;
-  kind.has_weight = take("4");
+  for (size_t before = 0; before != word.size();) {
+    before = word.size();
+    if (take("ST")) kind.other_count += 2;
+    if (take("C")) kind.has_colour = true;
+    if (take("N")) kind.other_count += 3;
+    if (take("4")) kind.has_weight = true;
+  }
   return word == "OFF" ? std::optional(kind) : std::nullopt;
 }
 
@@ -71,6 +75,13 @@ class OffParser {
  private:
   absl::Status ReadHeader() {
     OffWords words = lines_.NextWords();
+    // The data sets ModelNet have "OFF490 518 0", and the format lets a file begin with the
+    // numbers.
+    if (!words.empty() && words[0].starts_with("OFF") && words[0].size() > 3) {
+      words[0].remove_prefix(3);
+    }
+    const bool begins_with_numbers = words.size() > 1 && ToNumber<uint32_t>(words[0]);
+    if (begins_with_numbers) words.insert(words.begin(), "OFF");
     const std::optional<OffKind> kind = words.empty() ? std::nullopt : ToOffKind(words[0]);
     if (!kind) {
       return lines_.Unreadable(

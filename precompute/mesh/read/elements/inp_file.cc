@@ -221,6 +221,11 @@ class InpParser {
   /// Takes a line of data of the current block.
   absl::Status Take(std::string_view line) {
     ++data_lines_;
+    if (keyword_.name.empty()) {
+      return lines_.Unreadable(
+          "data before the first keyword, so that it is no input of Abaqus or "
+          "CalculiX");
+    }
     const std::vector<std::string_view> fields = InpFields(line);
     if (keyword_.name == "NODE") return TakeNode(fields);
     if (keyword_.name == "ELEMENT" && kind_) return TakeElement(fields);

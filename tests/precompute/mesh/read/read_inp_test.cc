@@ -143,6 +143,7 @@ TEST_F(ReadInpTest, WhatIsNotReadIsRefusedByName) {
        "line 9: element 1 is there twice, with different nodes"},
       {flat + "*ELEMENT, TYPE=B31\n2, 1,2\n",
        "MESH_ELEMENT_UNSUPPORTED: the file has elements of type B31 (line 8)"},
+      {"8 6 0 0 0\n1 0. 0. 0.\n", "line 1: data before the first keyword"},
       {"*INSTANCE, NAME=a, PART=none\n", "an instance of the part \"none\", which is not there"},
       {flat + "*SYSTEM\n0,0,0, 1,0,0\n2,0,0\n", "no points of *SYSTEM, or they lie on one line"},
   };

@@ -133,6 +133,9 @@ TEST_F(ReadVariantsTest, OffIsReadAsItsFirstWordSays) {
   ExpectBox(with("COFF", " 9 9 9 255"), "off");
   ExpectBox(with("NOFF", " 0 0 1"), "off");
   ExpectBox(with("STCN4OFF", " 1 0 0 1 .5 .5 9 9 9"), "off");
+  ExpectBox(with("NCOFF", " 9 9 9 255 0 0 1"), "off");
+  ExpectBox("OFF" + with("", "").substr(1), "off");  // as in the data sets ModelNet
+  ExpectBox(with("", ""), "off");
   ExpectBox(with("OFF", " 9 9 9"), "off");
   EXPECT_THAT(Refused(with("OFF", " 9 9"), "off"), HasSubstr("a vertex with 5 numbers"));
   EXPECT_THAT(Refused("OFF BINARY\n", "off"), HasSubstr("binary OFF files are not read"));
