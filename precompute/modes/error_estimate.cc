@@ -5,25 +5,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "precompute/fem/curved_element.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/curved_edges.h"
 #include "precompute/modes/added_functions.h"
 #include "precompute/modes/curved_integrals.h"
+#include "precompute/modes/patch_kernels.h"
+#include "precompute/modes/places.h"
 #include "precompute/modes/reentrant_edges.h"
-#include "precompute/sparse/dense_blas.h"
+#include "precompute/sparse/block_kernels.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
 
 namespace carillon::precompute {
 namespace {
-
-/// One row for each unknown, so that the rows of an element are close in memory.
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 using Barycentric = Eigen::Vector4d;
 
@@ -37,37 +37,54 @@ constexpr double kMostError = 0.99;
 /// Power of a mode's error in its weight, see ErrorEstimate.
 constexpr double kWeightPower = 2;
 
-/// Residuals are computed in batches of modes that fit into max(kResidualBytes, kTimesShapes * size
-/// of the shapes), but of at least kFewestModesAtATime modes. The solver needed more than this in
-/// addition to the shapes.
-constexpr size_t kResidualBytes = size_t{512} << 20U;
-constexpr size_t kTimesShapes = 2;
-constexpr size_t kFewestModesAtATime = 8;
+/// Number of modes in one pass over the places, which bounds the memory for their parts.
+constexpr Eigen::Index kModesAtATime = 4 * Eigen::Index{kBlockWidth};
+/// Number of places that a thread takes at a time. The sums of these are added in their order, so
+/// that they do not depend on the number of threads.
+constexpr size_t kPlacesAtATime = 4096;
 
 /// Integrals of products of two sets of functions over a tetrahedron of volume one.
 class ReferenceIntegrals {
  public:
   explicit ReferenceIntegrals(int node_count) {
+    std::vector<Eigen::Matrix4d> derivatives;  // products of those of both functions
     ForEachPoint([&](const Barycentric& at, double weight) {
       const std::vector<FunctionAt> base = BaseFunctions(at, node_count);
       const std::vector<FunctionAt> added = AddedFunctions(at, node_count);
-      mixed.resize(added.size() * base.size(), Eigen::Matrix4d::Zero());
+      derivatives.resize(added.size() * base.size(), Eigen::Matrix4d::Zero());
       own.resize(added.size(), Eigen::Matrix4d::Zero());
       if (mass.size() == 0) mass.setZero(Eigen::Index(added.size()), Eigen::Index(base.size()));
       for (size_t i = 0; i < added.size(); ++i) {
         own[i] += weight * added[i].derivative * added[i].derivative.transpose();
         for (size_t j = 0; j < base.size(); ++j) {
-          mixed[i * base.size() + j] +=
+          derivatives[i * base.size() + j] +=
               weight * added[i].derivative * base[j].derivative.transpose();
           mass(Eigen::Index(i), Eigen::Index(j)) += weight * added[i].value * base[j].value;
         }
       }
     });
+    for (const Eigen::Matrix4d& products : derivatives) mixed.emplace_back(products);
   }
 
-  std::vector<Eigen::Matrix4d> mixed;  ///< [added * #base + base]: products of derivatives
-  std::vector<Eigen::Matrix4d> own;    ///< [added]: each added function with itself
-  Eigen::MatrixXd mass;                ///< #added by #base
+  /// The integrals for an added and an own function. An own function depends on one or two of the
+  /// barycentric coordinates.
+  struct Mixed {
+    explicit Mixed(const Eigen::Matrix4d& products) {
+      for (Eigen::Index k = 0; k < 4; ++k) {
+        if (products.col(k).isZero(0)) continue;
+        coordinates[static_cast<size_t>(count)] = k;
+        columns.col(count++) = products.col(k);
+      }
+    }
+
+    Eigen::Index count = 0;
+    std::array<Eigen::Index, 2> coordinates = {};  ///< on which the own function depends
+    Eigen::Matrix<double, 4, 2> columns;           ///< by the added function's coordinates
+  };
+
+  std::vector<Mixed> mixed;          ///< [added * #base + base]: products of derivatives
+  std::vector<Eigen::Matrix4d> own;  ///< [added]: each added function with itself
+  Eigen::MatrixXd mass;              ///< #added by #base
 
  private:
   /// Uses the product of Gauss-Legendre rules of four points, collapsed onto the tetrahedron. It is
@@ -91,87 +108,24 @@ class ReferenceIntegrals {
   }
 };
 
-/// Returns a(f, g) of two functions, a 3 by 3 block for their components. It is lambda G + mu G^T +
-/// mu tr(G) I with G = vol sum_ij T_ij grad L_i grad L_j^T, where T has the integrals of products
-/// of the functions' derivatives.
+/// Returns a(f, g) of two functions, a 3 by 3 block for their components, where `integrals` has the
+/// integrals of products of the functions' derivatives.
 Eigen::Matrix3d Stiffness(const Eigen::Matrix4d& integrals, const TetGeometry& geometry,
                           const LameConstants& lame) {
-  const Eigen::Matrix3d G =
-      geometry.volume_m3 * geometry.gradients.transpose() * integrals * geometry.gradients;
-  return lame.lambda_pa * G + lame.mu_pa * G.transpose() +
-         lame.mu_pa * G.trace() * Eigen::Matrix3d::Identity();
+  return StiffnessBlock(
+      geometry.volume_m3 * geometry.gradients.transpose() * integrals * geometry.gradients, lame);
 }
 
-/// Numbers the edges and faces of a mesh. The edges and faces of an element are in the order of
-/// AddedFunctions.
-class Places {
- public:
-  explicit Places(const TetMesh& mesh) : added_(mesh.nodes_per_element == 10 ? 10 : 6) {
-    absl::flat_hash_map<std::array<int32_t, 3>, int32_t> numbers;
-    for (size_t e = 0; e < mesh.element_count(); ++e) {
-      const int32_t* corners = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
-      for (const auto& [a, b] : kTetEdges) {
-        Number({corners[a], corners[b], -1}, corners[a] < corners[b] ? 1 : -1, numbers);
-      }
-      if (added_ == 6) continue;
-      for (const auto& [a, b, c] : kTetFaces) {
-        Number({corners[a], corners[b], corners[c]}, 1, numbers);
-      }
-    }
-    nodes_.resize(numbers.size());
-    for (const auto& [nodes, number] : numbers) nodes_[static_cast<size_t>(number)] = nodes;
+Eigen::Matrix3d Stiffness(const ReferenceIntegrals::Mixed& integrals, const TetGeometry& geometry,
+                          const LameConstants& lame) {
+  Eigen::Matrix3d outer = Eigen::Matrix3d::Zero();
+  for (Eigen::Index k = 0; k < integrals.count; ++k) {
+    const Eigen::Vector3d along = geometry.gradients.transpose() * integrals.columns.col(k);
+    outer += geometry.volume_m3 * along *
+             geometry.gradients.row(integrals.coordinates[static_cast<size_t>(k)]);
   }
-
-  /// Returns for each edge or face whether it is fixed, that is, whether all of its corners are
-  /// fixed.
-  std::vector<bool> FixedWith(const TetMesh& mesh) const {
-    std::vector<bool> node_is_fixed(mesh.nodes.size());
-    for (const int32_t node : mesh.fixed) node_is_fixed[static_cast<size_t>(node)] = true;
-    std::vector<bool> fixed;
-    for (const auto& corners : nodes_) {
-      fixed.push_back(std::ranges::all_of(corners, [&](int32_t node) {
-        return node < 0 || node_is_fixed[static_cast<size_t>(node)];
-      }));
-    }
-    return fixed;
-  }
-
-  /// Returns for each edge or face the largest of the nodes' values at its corners.
-  std::vector<double> LargestOf(const std::vector<double>& values) const {
-    std::vector<double> largest(nodes_.size());
-    for (size_t b = 0; b < nodes_.size(); ++b) {
-      for (const int32_t node : nodes_[b]) {
-        if (node >= 0) largest[b] = std::max(largest[b], values[static_cast<size_t>(node)]);
-      }
-    }
-    return largest;
-  }
-
-  size_t count() const { return nodes_.size(); }
-  /// The corners of an edge or face, ascending; for an edge, -1 comes first.
-  const std::array<int32_t, 3>& Corners(size_t place) const { return nodes_[place]; }
-  size_t added() const { return added_; }
-  int32_t Of(size_t element, size_t i) const { return number_[element * added_ + i]; }
-  /// An odd function on an edge changes its sign with the edge's direction. The added function of a
-  /// linear element is even.
-  double Sign(size_t element, size_t i) const {
-    return added_ == 6 ? 1.0 : static_cast<double>(sign_[element * added_ + i]);
-  }
-
- private:
-  void Number(std::array<int32_t, 3> nodes, int sign,
-              absl::flat_hash_map<std::array<int32_t, 3>, int32_t>& numbers) {
-    std::ranges::sort(nodes);
-    const auto next = static_cast<int32_t>(numbers.size());
-    number_.push_back(numbers.try_emplace(nodes, next).first->second);
-    sign_.push_back(static_cast<int8_t>(sign));
-  }
-
-  size_t added_;
-  std::vector<std::array<int32_t, 3>> nodes_;  // the corners; for an edge, -1 comes first
-  std::vector<int32_t> number_;
-  std::vector<int8_t> sign_;
-};
+  return StiffnessBlock(outer, lame);
+}
 
 TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
   Eigen::Matrix<double, 3, 4> corners;
@@ -181,7 +135,52 @@ TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
   return MakeTetGeometry(corners);
 }
 
-/// Sums the contributions of the elements to each edge and face.
+/// The nodes whose motions count for the residual at each place: those of the elements at the
+/// place.
+class Patches {
+ public:
+  Patches(const TetMesh& mesh, const Places& places) : start_(places.count() + 1) {
+    const auto node_count = static_cast<size_t>(mesh.nodes_per_element);
+    std::vector<size_t> element_start(places.count() + 1);
+    const size_t total = mesh.element_count() * places.of_element();
+    for (size_t k = 0; k < total; ++k) ++element_start[places.Of(0, k) + 1];
+    for (size_t b = 0; b < places.count(); ++b) element_start[b + 1] += element_start[b];
+    std::vector<size_t> elements(total), next(element_start.begin(), element_start.end() - 1);
+    for (size_t k = 0; k < total; ++k) elements[next[places.Of(0, k)]++] = k / places.of_element();
+    for (size_t b = 0; b < places.count(); ++b) {
+      for (size_t k = element_start[b]; k < element_start[b + 1]; ++k) {
+        const int32_t* const nodes = &mesh.elements[elements[k] * node_count];
+        for (size_t n = 0; n < node_count; ++n) {
+          const auto first = nodes_.begin() + static_cast<ptrdiff_t>(start_[b]);
+          if (std::find(first, nodes_.end(), nodes[n]) == nodes_.end()) nodes_.push_back(nodes[n]);
+        }
+      }
+      start_[b + 1] = nodes_.size();
+    }
+    blocks_.resize(nodes_.size());
+  }
+
+  Patch Of(size_t place) const {
+    const size_t first = start_[place];
+    return {std::span(nodes_).subspan(first, start_[place + 1] - first), &blocks_[first]};
+  }
+
+  void Add(size_t place, int32_t node, const Eigen::Matrix3d& stiffness, double mass) {
+    const auto first = nodes_.begin() + static_cast<ptrdiff_t>(start_[place]);
+    PatchBlock& block =
+        blocks_[static_cast<size_t>(std::find(first, nodes_.end(), node) - nodes_.begin())];
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(block.stiffness.data()) += stiffness;
+    block.mass += mass;
+  }
+
+ private:
+  std::vector<size_t> start_;  // index of each place's first node
+  std::vector<int32_t> nodes_;
+  std::vector<PatchBlock> blocks_;
+};
+
+/// The residual of a mode at each edge and face, r_b = a(b, phi) - Lambda m(b, phi), as a sum over
+/// nodes.
 class Estimator {
  public:
   Estimator(const TetMesh& mesh, const BodyMaterials& materials)
@@ -190,105 +189,80 @@ class Estimator {
         nodes_(static_cast<size_t>(mesh.nodes_per_element)),
         integrals_(mesh.nodes_per_element),
         places_(mesh),
-        fixed_(places_.FixedWith(mesh)),
-        weights_(places_.LargestOf(PlaceWeights(mesh))),
-        stiffness_(places_.count(), Eigen::Matrix3d::Zero()) {
+        patches_(mesh, places_),
+        flexibility_(places_.count()) {
+    std::vector<Eigen::Matrix3d> own(places_.count(), Eigen::Matrix3d::Zero());
     for (size_t e = 0; e < mesh_.element_count(); ++e) {
       if (IsCurved(mesh_, e)) {
-        AddCurved(e);
-        continue;
-      }
-      const TetGeometry geometry = GeometryOf(mesh_, Element(e));
-      for (size_t i = 0; i < places_.added(); ++i) {
-        stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
-            Stiffness(integrals_.own[i], geometry, materials_.LameOf(mesh_, e));
+        AddCurved(e, own);
+      } else {
+        AddStraight(e, own);
       }
     }
-  }
-
-  /// Returns the best number of modes for each thread in one pass over the elements. If memory
-  /// allows, one thread takes all modes in one pass, because most of the time of a pass is spent on
-  /// the elements.
-  Eigen::Index ModesAtATime(const Eigen::MatrixXd& shapes, int thread_count) const {
-    const size_t bytes_of_mode = 3 * sizeof(double) * places_.count();
-    const size_t shape_bytes = sizeof(double) * static_cast<size_t>(shapes.size());
-    const size_t most = std::max(kResidualBytes, kTimesShapes * shape_bytes) / bytes_of_mode;
-    if (most >= static_cast<size_t>(shapes.cols())) return std::max<Eigen::Index>(shapes.cols(), 1);
-    return static_cast<Eigen::Index>(
-        std::max(kFewestModesAtATime, most / static_cast<size_t>(thread_count)));
+    const std::vector<double> weights = places_.LargestOf(PlaceWeights(mesh));
+    const std::vector<bool> fixed = places_.FixedWith(mesh);
+    for (size_t b = 0; b < places_.count(); ++b) {
+      flexibility_[b] = {};
+      if (fixed[b]) continue;  // its residual is the reaction force
+      Eigen::Matrix3d::Map(flexibility_[b].data()) = weights[b] * own[b].inverse();
+    }
   }
 
   /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each
   /// edge and face to `shares`. `shapes` has a row for each unknown and a column for each mode.
-  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues, const RowMatrix& shapes,
-                              Eigen::VectorXd& shares) const {
-    RowMatrix residuals =
-        RowMatrix::Zero(3 * static_cast<Eigen::Index>(places_.count()), shapes.cols());
-    ElementResidual element(static_cast<Eigen::Index>(3 * places_.added()),
-                            static_cast<Eigen::Index>(3 * nodes_), shapes.cols());
-    for (size_t e = 0; e < mesh_.element_count(); ++e) {
-      Fill(e, shapes, element);
-      element.Compute(eigenvalues);
-      for (size_t i = 0; i < places_.added(); ++i) {
-        residuals.middleRows<3>(3 * Eigen::Index{places_.Of(e, i)}) +=
-            places_.Sign(e, i) * element.result.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues,
+                              const Eigen::Ref<const Eigen::MatrixXd>& shapes, Workers& workers,
+                              std::vector<double>& shares) const {
+    const Eigen::Index count = eigenvalues.size();
+    const Eigen::Index width = (count + kBlockWidth - 1) / kBlockWidth * kBlockWidth;
+    const std::vector<double> by_rows = Transposed(shapes, width);
+    Eigen::VectorXd padded = Eigen::VectorXd::Zero(width);
+    padded.head(count) = eigenvalues;
+    const ShapeRows rows{by_rows.data(), padded.data(), width};
+    const size_t group_count = (places_.count() + kPlacesAtATime - 1) / kPlacesAtATime;
+    Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(width, static_cast<Eigen::Index>(group_count));
+    std::vector<float> parts(places_.count() * static_cast<size_t>(width));
+    workers.ForEach(static_cast<int64_t>(group_count), [&](int64_t group) {
+      const size_t first = static_cast<size_t>(group) * kPlacesAtATime;
+      const size_t end = std::min(first + kPlacesAtATime, places_.count());
+      for (size_t b = first; b < end; ++b) {
+        AddPatchParts(patches_.Of(b), flexibility_[b], rows, sums.col(group).data(),
+                      &parts[b * static_cast<size_t>(width)]);
       }
-    }
-    Eigen::VectorXd sums = Eigen::VectorXd::Zero(shapes.cols());
+    });
+    const Eigen::VectorXd all = sums.rowwise().sum();
+    const Eigen::VectorXf weights = WeightsOf(eigenvalues, all.head(count)).cast<float>();
     for (size_t b = 0; b < places_.count(); ++b) {
-      if (fixed_[b]) continue;  // its residual is the reaction force
-      const auto r = residuals.middleRows<3>(3 * static_cast<Eigen::Index>(b));
-      const Eigen::RowVectorXd part =
-          weights_[b] * r.cwiseProduct(stiffness_[b].inverse() * r).colwise().sum();
-      sums += part.transpose();
-      residuals.row(3 * static_cast<Eigen::Index>(b)) = part;
+      const auto of_place = Eigen::VectorXf::Map(&parts[b * static_cast<size_t>(width)], count);
+      shares[b] += static_cast<double>(of_place.dot(weights));
     }
-    const Eigen::VectorXd weights = WeightsOf(eigenvalues, sums);
-    for (size_t b = 0; b < places_.count(); ++b) {
-      const auto row = static_cast<Eigen::Index>(b);
-      if (!fixed_[b]) shares[row] += residuals.row(3 * row) * weights;
-    }
-    return sums;
+    return all.head(count);
   }
 
   /// Returns the shares of the edges and faces, distributed among their corners.
-  std::vector<double> AtNodes(const Eigen::VectorXd& shares) const {
-    std::vector<double> at_node(mesh_.nodes.size(), 0);
-    for (size_t b = 0; b < places_.count(); ++b) {
-      const std::array<int32_t, 3>& corners = places_.Corners(b);
-      const double part = shares[static_cast<Eigen::Index>(b)] / (corners[0] < 0 ? 2 : 3);
-      for (const int32_t node : corners) {
-        if (node >= 0) at_node[static_cast<size_t>(node)] += part;
-      }
-    }
-    return at_node;
+  std::vector<double> AtNodes(const std::vector<double>& shares) const {
+    return places_.AtNodes(mesh_, shares);
   }
 
   size_t place_count() const { return places_.count(); }
 
  private:
-  /// Computes the residuals of the modes for the added functions of an element, a(b, phi) - m(b,
-  /// phi) Lambda.
-  struct ElementResidual {
-    ElementResidual(Eigen::Index added, Eigen::Index unknowns, Eigen::Index mode_count)
-        : stiffness(added, unknowns),
-          mass(RowMatrix::Zero(added, unknowns)),
-          shapes(unknowns, mode_count),
-          inertial(added, mode_count),
-          result(added, mode_count) {}
-
-    void Compute(const Eigen::VectorXd& eigenvalues) {
-      RowProduct(stiffness, shapes, result);
-      RowProduct(mass, shapes, inertial);
-      result.array() -= inertial.array().rowwise() * eigenvalues.transpose().array();
+  /// Returns the shapes by rows, with zeros up to `width`. They are transposed in parts that fit
+  /// into the cache.
+  static std::vector<double> Transposed(const Eigen::Ref<const Eigen::MatrixXd>& shapes,
+                                        Eigen::Index width) {
+    constexpr Eigen::Index kPart = 64;
+    std::vector<double> rows(static_cast<size_t>(shapes.rows() * width));
+    for (Eigen::Index first = 0; first < shapes.rows(); first += kPart) {
+      const Eigen::Index end = std::min(first + kPart, shapes.rows());
+      for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
+        for (Eigen::Index r = first; r < end; ++r) {
+          rows[static_cast<size_t>(r * width + m)] = shapes(r, m);
+        }
+      }
     }
-
-    RowMatrix stiffness;  ///< #added by #unknowns
-    RowMatrix mass;
-    RowMatrix shapes;  ///< #unknowns by #modes
-    RowMatrix inertial;
-    RowMatrix result;  ///< #added by #modes
-  };
+    return rows;
+  }
 
   /// Returns the weights of the modes in the local shares, see ErrorEstimate.
   static Eigen::VectorXd WeightsOf(const Eigen::VectorXd& eigenvalues,
@@ -296,53 +270,39 @@ class Estimator {
     return (sums.array() / eigenvalues.array()).pow(kWeightPower) / eigenvalues.array();
   }
 
-  /// Computes z := x y, which for column-major matrices is z^T = y^T x^T.
-  static void RowProduct(const RowMatrix& x, const RowMatrix& y, RowMatrix& z) {
-    const auto columns = static_cast<int>(y.cols()), inner = static_cast<int>(x.cols());
-    blas::Product(columns, static_cast<int>(x.rows()), inner, y.data(), columns, x.data(), inner,
-                  z.data(), columns);
-  }
-
   const int32_t* Element(size_t e) const { return &mesh_.elements[e * nodes_]; }
 
-  void AddCurved(size_t e) {
-    const Eigen::Matrix<double, 3, 30> own =
-        curved_.OfAdded(NodesOf(mesh_, e), materials_.LameOf(mesh_, e));
-    for (size_t i = 0; i < places_.added(); ++i) {
-      stiffness_[static_cast<size_t>(places_.Of(e, i))] +=
-          own.middleCols<3>(static_cast<Eigen::Index>(3 * i));
-    }
-  }
-
-  void FillCurved(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
-    const CurvedIntegrals::Mixed mixed =
-        curved_.OfBoth(NodesOf(mesh_, e), materials_.LameOf(mesh_, e));
+  void AddCurved(size_t e, std::vector<Eigen::Matrix3d>& own) {
+    const LameConstants& lame = materials_.LameOf(mesh_, e);
+    const TenNodes nodes = NodesOf(mesh_, e);
+    const Eigen::Matrix<double, 3, 30> of_added = curved_.OfAdded(nodes, lame);
+    const CurvedIntegrals::Mixed mixed = curved_.OfBoth(nodes, lame);
     const double density = materials_.DensityOf(mesh_, e);
-    element.stiffness = mixed.stiffness;
-    for (Eigen::Index n = 0; n < 10; ++n) {
-      element.shapes.middleRows<3>(3 * n) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
-      for (Eigen::Index i = 0; i < 10; ++i) {
-        element.mass.block<3, 3>(3 * i, 3 * n).diagonal().setConstant(density * mixed.mass(i, n));
+    for (Eigen::Index i = 0; i < 10; ++i) {
+      const size_t place = places_.Of(e, static_cast<size_t>(i));
+      const double sign = places_.Sign(e, static_cast<size_t>(i));
+      own[place] += of_added.middleCols<3>(3 * i);
+      for (Eigen::Index n = 0; n < 10; ++n) {
+        patches_.Add(place, Element(e)[n], sign * mixed.stiffness.block<3, 3>(3 * i, 3 * n),
+                     sign * density * mixed.mass(i, n));
       }
     }
   }
 
-  void Fill(size_t e, const RowMatrix& shapes, ElementResidual& element) const {
-    if (IsCurved(mesh_, e)) return FillCurved(e, shapes, element);
+  void AddStraight(size_t e, std::vector<Eigen::Matrix3d>& own) {
     const TetGeometry geometry = GeometryOf(mesh_, Element(e));
     const LameConstants& lame = materials_.LameOf(mesh_, e);
     const double mass = materials_.DensityOf(mesh_, e) * geometry.volume_m3;
-    for (size_t n = 0; n < nodes_; ++n) {
-      const auto column = static_cast<Eigen::Index>(3 * n);
-      element.shapes.middleRows<3>(column) = shapes.middleRows<3>(3 * Eigen::Index{Element(e)[n]});
-      for (size_t i = 0; i < places_.added(); ++i) {
-        const auto row = static_cast<Eigen::Index>(3 * i);
-        element.stiffness.block<3, 3>(row, column) =
-            Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame);
-        element.mass.block<3, 3>(row, column)
-            .diagonal()
-            .setConstant(
-                mass * integrals_.mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n)));
+    for (size_t i = 0; i < places_.of_element(); ++i) {
+      const size_t place = places_.Of(e, i);
+      const double sign = places_.Sign(e, i);
+      own[place] += Stiffness(integrals_.own[i], geometry, lame);
+      for (size_t n = 0; n < nodes_; ++n) {
+        const double part =
+            integrals_.mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(n));
+        patches_.Add(place, Element(e)[n],
+                     sign * Stiffness(integrals_.mixed[i * nodes_ + n], geometry, lame),
+                     sign * mass * part);
       }
     }
   }
@@ -353,9 +313,8 @@ class Estimator {
   const ReferenceIntegrals integrals_;
   const CurvedIntegrals curved_;
   const Places places_;
-  const std::vector<bool> fixed_;
-  const std::vector<double> weights_;       // w of each edge or face
-  std::vector<Eigen::Matrix3d> stiffness_;  // a(b, b) of each edge or face
+  Patches patches_;
+  std::vector<std::array<double, 9>> flexibility_;  // w a(b, b)^-1 of each edge or face
 };
 
 }  // namespace
@@ -365,25 +324,18 @@ ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const BodyMaterials& 
   const Estimator estimator(mesh, materials);
   const double constant = mesh.nodes_per_element == 10 ? kQuadraticConstant : kLinearConstant;
   Eigen::VectorXd errors(modes.eigenvalues.size());
+  std::vector<double> shares(estimator.place_count());
   Workers workers(ThreadCount());
-  const Eigen::Index at_a_time = estimator.ModesAtATime(modes.shapes, workers.count());
-  const Eigen::Index part_count = (errors.size() + at_a_time - 1) / at_a_time;
-  Eigen::MatrixXd shares =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(estimator.place_count()), part_count);
-  workers.ForEach(part_count, [&](int64_t part) {
-    const Eigen::Index first = part * at_a_time;
-    const Eigen::Index count = std::min(at_a_time, errors.size() - first);
-    Eigen::VectorXd shares_of_part = Eigen::VectorXd::Zero(shares.rows());
+  for (Eigen::Index first = 0; first < errors.size(); first += kModesAtATime) {
+    const Eigen::Index count = std::min(kModesAtATime, errors.size() - first);
+    const Eigen::VectorXd eigenvalues = modes.eigenvalues.segment(first, count);
     const Eigen::VectorXd corrections =
-        estimator.Corrections(modes.eigenvalues.segment(first, count),
-                              modes.shapes.middleCols(first, count), shares_of_part);
-    shares.col(part) = shares_of_part;
-    const Eigen::ArrayXd relative =
-        constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
+        estimator.Corrections(eigenvalues, modes.shapes.middleCols(first, count), workers, shares);
+    const Eigen::ArrayXd relative = constant * corrections.array() / eigenvalues.array();
     // A frequency is proportional to the square root of its eigenvalue.
     errors.segment(first, count) = (1 - relative.min(kMostError)).sqrt().inverse() - 1;
-  });
-  return {std::move(errors), estimator.AtNodes(shares.rowwise().sum())};
+  }
+  return {std::move(errors), estimator.AtNodes(shares)};
 }
 
 }  // namespace carillon::precompute
