@@ -97,7 +97,7 @@ TEST_F(ReadElementsTest, ShellsOfAbaqusAloneAreASurface) {
 TEST_F(ReadElementsTest, BadInpFilesAreRefusedWithTheLine) {
   const std::string nodes = "*NODE\n1, 0,0,0\n2, 1,0,0\n3, 0,1,0\n4, 0,0,1\n";
   const std::vector<std::pair<std::string, const char*>> cases = {
-      {"Dear Carillon,\n", "MESH_EMPTY: "},
+      {"Dear Carillon,\n", "line 1: data before the first keyword"},
       {"*NODE\n1, 0, zero, 0\n", "MESH_UNREADABLE: line 2: no node (\"number, x, y, z\")"},
       {"*NODE\n,\n", "line 2: no node"},
       {nodes + "*ELEMENT, TYPE=C3D8\n",
