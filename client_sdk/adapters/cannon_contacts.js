@@ -29,7 +29,8 @@ class CannonContacts {
 
   /**
    * Returns what a step of a stream or trace takes. Call it after each step that the engine computes: after
-   * world.step(dt) without a time since the last call, otherwise in the world's event 'postStep'.
+   * world.step(dt) without a time since the last call, otherwise in the world's event 'postStep'. The poses are those
+   * from before the step, to which the engine's points belong.
    */
   read(world) {
     for (const body of this.bodies.values()) if (body.world !== world) this.removeObject(body);
@@ -40,8 +41,8 @@ class CannonContacts {
       const normal = times(vector(equation.ni), -1);
       contacts.push({ equation, first: describe(equation.bi), second: describe(equation.bj), normal,
         impulse: times(normal, equation.multiplier * world.dt),
-        point: plus(vector(equation.bi.position), vector(equation.ri)),
-        pointOnSecond: plus(vector(equation.bj.position), vector(equation.rj)) });
+        point: plus(vector(equation.bi.previousPosition), vector(equation.ri)),
+        pointOnSecond: plus(vector(equation.bj.previousPosition), vector(equation.rj)) });
     }
     this.addFriction(contacts, world);
     const rows = contacts.filter(({ impulse }) => impulse.some((x) => x !== 0))
@@ -65,13 +66,13 @@ class CannonContacts {
   }
 }
 
-function poseOf({ position, quaternion: { w, x, y, z } }) {
-  return [vector(position), [w, x, y, z]];
+function poseOf({ previousPosition, previousQuaternion: { w, x, y, z } }) {
+  return [vector(previousPosition), [w, x, y, z]];
 }
 
 function describe(body) {
   if (!(body.invMass > 0)) return { key: body.id };
-  return { key: body.id, massKg: body.mass, centre: vector(body.position), velocity: vector(body.velocity),
+  return { key: body.id, massKg: body.mass, centre: vector(body.previousPosition), velocity: vector(body.velocity),
     angularVelocity: vector(body.angularVelocity) };
 }
 

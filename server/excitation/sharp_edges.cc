@@ -33,24 +33,47 @@ Point NearestOf(const std::array<Point, 2>& edge, const Point& point) {
 
 }  // namespace
 
-SharpEdges::SharpEdges(std::span<const std::array<float, 3>> vertices,
-                       std::span<const std::array<uint32_t, 2>> edges) {
-  if (edges.size() > kMostEdges) return;
+SharpEdges::SharpEdges(const SurfaceCurvature& curvature) {
+  const auto vertices = curvature.vertices();
   const auto at = [&](uint32_t vertex) {
     return Point{vertices[vertex][0], vertices[vertex][1], vertices[vertex][2]};
   };
-  for (const auto& [from, to] : edges) edges_.push_back({at(from), at(to)});
+  Point least{}, most{};
+  for (const auto& [from, to] : curvature.sharp_edges()) {
+    edges_.push_back({.ends = {at(from), at(to)},
+                      .is_corner = {curvature.is_corner(from), curvature.is_corner(to)}});
+    for (size_t i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(edges_.back().ends[0][i], edges_.back().ends[1][i]);
+      least[i] = edges_.size() == 1 ? low : std::min(least[i], low);
+      most[i] = edges_.size() == 1 ? high : std::max(most[i], high);
+    }
+  }
+  const Point extent = Between(least, most);
+  axis_ = static_cast<size_t>(std::ranges::max_element(extent) - extent.begin());
+  for (Edge& edge : edges_) {
+    const auto [low, high] = std::minmax(edge.ends[0][axis_], edge.ends[1][axis_]);
+    edge.begin_m = low;
+    longest_m_ = std::max(longest_m_, high - low);
+  }
+  std::ranges::stable_sort(edges_, {}, &Edge::begin_m);
+}
+
+std::span<const SharpEdges::Edge> SharpEdges::Around(const Point& point, double reach_m) const {
+  const auto first =
+      std::ranges::lower_bound(edges_, point[axis_] - reach_m - longest_m_, {}, &Edge::begin_m);
+  const auto last =
+      std::ranges::upper_bound(first, edges_.end(), point[axis_] + reach_m, {}, &Edge::begin_m);
+  return {first, last};
 }
 
 std::optional<Point> SharpEdges::Protruding(const Point& point, double depth_m,
                                             const std::array<double, 3>& impulse) const {
   const double reach_m = kReach * depth_m, strength = std::sqrt(Along(impulse, impulse));
-  // This close to an edge, the surface's curvature is that of the edge anyway.
   if (reach_m < kEdgeRadiusM || strength == 0) return std::nullopt;
   std::optional<Point> found;
   double farthest_m = 0;
-  for (const std::array<Point, 2>& edge : edges_) {
-    for (const Point& place : {edge[0], edge[1], NearestOf(edge, point)}) {
+  for (const Edge& edge : Around(point, reach_m)) {
+    for (const Point& place : {edge.ends[0], edge.ends[1], NearestOf(edge.ends, point)}) {
       const Point way = Between(point, place);
       const double distance_m = std::sqrt(Along(way, way));
       const double out_m = -Along(way, impulse) / strength;
@@ -61,6 +84,28 @@ std::optional<Point> SharpEdges::Protruding(const Point& point, double depth_m,
     }
   }
   return found;
+}
+
+std::optional<Point> SharpEdges::Beside(const Point& point, double tolerance_m,
+                                        const std::array<double, 3>& impulse) const {
+  const double strength = std::sqrt(Along(impulse, impulse));
+  std::optional<Point> corner, on_edge;
+  double to_corner_m = tolerance_m, to_edge_m = tolerance_m;
+  const auto consider = [&](const Point& place, double& nearest_m, std::optional<Point>& found) {
+    const Point way = Between(point, place);
+    const double distance_m = std::sqrt(Along(way, way));
+    const bool behind = Along(way, impulse) > kLeastCosine * distance_m * strength;
+    if (distance_m > nearest_m || behind) return;
+    nearest_m = distance_m;
+    found = place;
+  };
+  for (const Edge& edge : Around(point, tolerance_m)) {
+    consider(NearestOf(edge.ends, point), to_edge_m, on_edge);
+    for (size_t i = 0; i < edge.ends.size(); ++i) {
+      if (edge.is_corner[i]) consider(edge.ends[i], to_corner_m, corner);
+    }
+  }
+  return corner ? corner : on_edge;
 }
 
 }  // namespace carillon

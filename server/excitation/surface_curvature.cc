@@ -166,22 +166,51 @@ SurfaceCurvature::SurfaceCurvature(std::span<const std::array<float, 3>> vertice
   Facets facets(vertices, triangles);
   curvature_per_m_ = facets.MeanCurvatures();
   sharp_sides_ = std::move(facets.sharp());
+  FindCorners();
+}
+
+void SurfaceCurvature::FindCorners() {
+  sharpness_.resize(vertices_.size());
+  std::vector<Point> along(vertices_.size());  // the first sharp edge of a vertex, as a unit vector
+  for (const auto& [from, to] : sharp_edges()) {
+    Point edge{};
+    for (size_t i = 0; i < 3; ++i) edge[i] = double{vertices_[to][i]} - vertices_[from][i];
+    const double length = Length(edge);
+    for (double& x : edge) x /= length > 0 ? length : 1;
+    for (const uint32_t vertex : {from, to}) {
+      const bool bends = std::abs(Dot(along[vertex], edge)) < std::cos(kSharpAngle);
+      if (sharpness_[vertex] == 0) {
+        sharpness_[vertex] = kEdge;
+        along[vertex] = edge;
+      } else if (bends) {
+        sharpness_[vertex] = kCorner;
+      }
+    }
+  }
 }
 
 double SurfaceCurvature::At(uint32_t triangle, const Point& point, double size) const {
-  const auto corner = [&](size_t i) {
-    const std::array<float, 3>& vertex = vertices_[triangles_[triangle][i % 3]];
-    return Point{vertex[0], vertex[1], vertex[2]};
-  };
   if (triangle >= triangles_.size()) return 0;
-  double sharp = 0;
-  for (size_t side = 0; side < 3; ++side) {
-    if ((sharp_sides_[triangle] >> side & 1) == 0) continue;
-    if (DistanceFromSegment(point, corner(side), corner(side + 1)) * size > kEdgeRadiusM) continue;
-    sharp += 0.5 / kEdgeRadiusM;
+  const std::array<uint32_t, 3>& vertices = triangles_[triangle];
+  std::array<Point, 3> corners;
+  for (size_t i = 0; i < 3; ++i) {
+    const std::array<float, 3>& vertex = vertices_[vertices[i]];
+    corners[i] = {vertex[0], vertex[1], vertex[2]};
+  }
+  // Which of the triangles that meet at an edge or corner is the nearest is up to rounding.
+  uint8_t sharpness = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    if (Length(Minus(point, corners[i])) * size <= kEdgeRadiusM) {
+      sharpness = std::max(sharpness, sharpness_[vertices[i]]);
+    }
+    if ((sharp_sides_[triangle] >> i & 1) == 0) continue;
+    if (DistanceFromSegment(point, corners[i], corners[(i + 1) % 3]) * size <= kEdgeRadiusM) {
+      sharpness = std::max(sharpness, kEdge);
+    }
   }
   const double round = curvature_per_m_[triangle] / size;
-  return std::clamp(std::max(round, sharp), -1 / kEdgeRadiusM, 1 / kEdgeRadiusM);
+  return std::clamp(std::max(round, sharpness * 0.5 / kEdgeRadiusM), -1 / kEdgeRadiusM,
+                    1 / kEdgeRadiusM);
 }
 
 std::vector<std::array<uint32_t, 2>> SurfaceCurvature::sharp_edges() const {

@@ -402,15 +402,30 @@ void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   if (!(impulse > kRounding * all)) return CountAsLoad(blow);
   blow.steps.clear();
   ++counts_.blow_count;
+  const std::map<uint32_t, double> at_place = MagnitudesByPlace(blow.touches);
   double whole = 0;
-  for (const PairTouch& touch : blow.touches) whole += touch.magnitude;
-  const double scale = impulse / whole;
+  for (const auto& [place, magnitude] : at_place) whole += magnitude;
   for (const PairTouch& touch : blow.touches) {
+    const BlowShares shares{.scale = impulse / whole,
+                            .of_blow = touch.magnitude / whole,
+                            .of_place = at_place.at(PlaceOf(touch)) / whole};
     for (size_t i = 0; i < touch.part_count; ++i) {
-      events_.push_back(PartOfBlow(touch, i, scale));
+      events_.push_back(PartOfBlow(touch, i, shares));
       events_.back().time_s = TimeOf(pair.bodies, blow, touch);
     }
   }
+}
+
+uint32_t BlowGatherer::PlaceOf(const PairTouch& touch) {
+  const SurfaceImpulse& impulse = touch.parts[0].impulse;
+  const auto nearest = std::ranges::max_element(impulse.at.weights) - impulse.at.weights.begin();
+  return impulse.at.vertices[static_cast<size_t>(nearest)];
+}
+
+std::map<uint32_t, double> BlowGatherer::MagnitudesByPlace(std::span<const PairTouch> touches) {
+  std::map<uint32_t, double> magnitudes;
+  for (const PairTouch& touch : touches) magnitudes[PlaceOf(touch)] += touch.magnitude;
+  return magnitudes;
 }
 
 double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const {
@@ -418,18 +433,27 @@ double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTo
   return *time_s_ + Share(blow.begin_s, bodies.first, bodies.second) * step_s_;
 }
 
-/// Returns the impulse on the first or the second object of a touch, times `scale`.
-ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which, double scale) {
-  const double longer = touch.duration_follows_impulse ? std::pow(scale, kDurationPower) : 1;
+/// Returns the impulse on the first or the second object of a touch.
+ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which,
+                                    const BlowShares& shares) {
+  double longer = 1;
+  Collision collision = touch.parts[which].collision;
+  if (collision.reduced_mass_kg > 0) {
+    longer *= std::pow(shares.of_place, kMassPower);
+    collision.reduced_mass_kg *= shares.of_blow;
+  }
+  if (touch.duration_follows_impulse) {
+    longer *= std::pow(shares.scale / shares.of_blow, kDurationPower);
+  }
   const Part& part = touch.parts[which];
   SurfaceImpulse impulse = part.impulse;
-  impulse.impulse_newton_seconds = Scaled(impulse.impulse_newton_seconds, scale);
+  impulse.impulse_newton_seconds = Scaled(impulse.impulse_newton_seconds, shares.scale);
   impulse.pulse = impulse.pulse.Lasting(static_cast<float>(impulse.pulse.duration_s() * longer));
   const bool of_two = touch.part_count == touch.parts.size();
   return {.handle = part.handle,
           .serial = part.serial,
           .action = impulse,
-          .collision = part.collision,
+          .collision = collision,
           .by = of_two ? touch.parts[1 - which].handle : touch.bodies.second,
           .by_sounds = of_two};
 }

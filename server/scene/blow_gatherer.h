@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -65,6 +66,11 @@ struct ForceEvent {
 /// first steps of a simulation, or shortly after the last contact, such a feeble blow is not over
 /// before its contact has been lost for some steps, and is a load if the contact returns before
 /// that. Others, after a flight, need not wait.
+///
+/// The contacts of a pair that strike in one step share the impact: where a face lands flat, all of
+/// its corners meet the floor at the same speed, and each brings a part of the mass to rest. The
+/// reduced mass of a contact is the part of the pair's that the contact has of the blow's impulse,
+/// and its speed that of the whole blow. Several contacts at one place count as one.
 ///
 /// A body that slides from one partner to the next, such as over the tiles of a floor, takes its
 /// load along. If a pair begins to touch in the step in which another pair of the same body
@@ -148,7 +154,16 @@ class BlowGatherer {
 
     std::span<const Part> all() const { return std::span(parts).first(part_count); }
   };
-  static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, double scale);
+  /// What a touch has of its blow.
+  struct BlowShares {
+    double scale = 1;    ///< impulse that the blow gives the touch, over that of its strongest step
+    double of_blow = 1;  ///< the part of the touch in the blow's impulse
+    double of_place = 1;  ///< the part of all touches at its place
+  };
+  static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, const BlowShares& shares);
+  /// Returns the vertex nearest to a touch. Touches with the same one are at the same place.
+  static uint32_t PlaceOf(const PairTouch& touch);
+  static std::map<uint32_t, double> MagnitudesByPlace(std::span<const PairTouch> touches);
   /// The sum of impulses on an object, N s, in the object's frame.
   struct Motion {
     uint32_t handle = 0;

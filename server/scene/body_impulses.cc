@@ -22,19 +22,30 @@ absl::StatusOr<LocatedPoint> Locate(const SoundingObject& object,
   return locator.Nearest(point);
 }
 
+/// Distance by which the shapes of engines differ from bodies along a face, metres: corners are
+/// rounded off, and a body turns within a step.
+constexpr double kEngineToleranceM = 0.002;
+/// The same for small bodies, as a part of their extent.
+constexpr double kEngineTolerance = 0.02;
+
 /// Locates a contact as Locate does, but moves a contact that an engine has found beneath an edge
-/// onto the edge.
+/// or beside it onto the edge.
 absl::StatusOr<LocatedPoint> LocateEngines(const SoundingObject& object,
                                            const std::variant<Point, SurfacePoint>& location,
                                            const Vector3& impulse) {
   ASSIGN_OR_RETURN(const LocatedPoint& nearest, Locate(object, location));
   if (!std::holds_alternative<Point>(location)) return nearest;
+  const double size = object.properties.material.size;
+  const SoundingBody& body = *object.body;
   Point point = std::get<Point>(location);
-  for (double& coordinate : point) coordinate /= object.properties.material.size;
-  const std::optional<Point> edge =
-      object.body->edges.Protruding(point, nearest.distance_m, impulse);
+  for (double& coordinate : point) coordinate /= size;
+  std::optional<Point> edge = body.edges.Protruding(point, nearest.distance_m, impulse);
+  if (!edge) {
+    const double tolerance_m = std::min(kEngineToleranceM / size, kEngineTolerance * body.extent_m);
+    edge = body.edges.Beside(body.At(nearest), tolerance_m, impulse);
+  }
   if (!edge) return nearest;
-  ASSIGN_OR_RETURN(LocatedPoint on_edge, object.body->locator->Nearest(*edge));
+  ASSIGN_OR_RETURN(LocatedPoint on_edge, body.locator->Nearest(*edge));
   on_edge.distance_m = nearest.distance_m;
   return on_edge;
 }
@@ -57,11 +68,7 @@ double MassKg(const SoundingObject& object) {
 /// Returns the object as one of two bodies that collide at `located`.
 ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& located) {
   const ModalModel& model = *object.body->model;
-  Point point{};
-  for (size_t i = 0; i < 3; ++i) {
-    const std::array<float, 3>& vertex = model.vertices[located.vertices[i]];
-    for (size_t axis = 0; axis < 3; ++axis) point[axis] += located.weights[i] * vertex[axis];
-  }
+  const Point point = object.body->At(located);
   const uint32_t given = model.given_triangle[located.triangle];
   const SoundingMaterial& material = object.properties.material;
   ElasticBody body{.young_pa = material.young_pa,

@@ -44,8 +44,11 @@ struct BodyImpulses {
   std::span<const BodyImpulse> all() const { return std::span(by).first(count); }
 };
 
-/// The duration of an elastic collision is proportional to the impulse to this power.
+/// The duration of an elastic collision is proportional to the speed, and so to the impulse, to
+/// this power.
 inline constexpr double kDurationPower = -0.2;
+/// The same for the reduced mass at a given speed.
+inline constexpr double kMassPower = 0.4;
 
 /// Who found the points of a contact.
 enum class PointSource {

@@ -60,19 +60,28 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
   ShapeTable shapes = tabulating.get();
   const ModalModel& of = *model;
   SurfaceCurvature curvature(of.given_vertices, of.given_triangles);
-  const SharpEdges edges(of.given_vertices, curvature.sharp_edges());
+  SharpEdges edges(curvature);
   return std::make_shared<const SoundingBody>(SoundingBody{
       .model = std::move(model),
       .shapes = std::move(shapes),
       .locator = std::move(locator),
       .curvature = std::move(curvature),
-      .edges = edges,
+      .edges = std::move(edges),
       .volume_m3 = of.regions.empty() ? VolumeM3(of.vertices, of.triangles) : of.mass_kg,
       .centre_m = CentreM(of.vertices, of.triangles),
       .extent_m = ExtentM(of.vertices)});
 }
 
 }  // namespace
+
+Point SoundingBody::At(const LocatedPoint& located) const {
+  Point point{};
+  for (size_t i = 0; i < 3; ++i) {
+    const std::array<float, 3>& vertex = model->vertices[located.vertices[i]];
+    for (size_t axis = 0; axis < 3; ++axis) point[axis] += located.weights[i] * vertex[axis];
+  }
+  return point;
+}
 
 absl::StatusOr<std::shared_ptr<const SoundingBody>> BodyCache::Get(
     std::shared_ptr<const ModalModel> model) {

@@ -31,6 +31,9 @@ struct SoundingBody {
   /// Centre of mass of a body of one material at the model's size.
   std::array<double, 3> centre_m{};
   double extent_m = 0;  ///< the diagonal of the bounding box at the model's size
+
+  /// Returns a point of the sounding surface, in the model's frame and size, metres.
+  Point At(const LocatedPoint& located) const;
 };
 
 /// Makes the body of a model once, and returns the same body as long as any object uses it. Safe

@@ -30,7 +30,7 @@ class SharpEdgesTest : public testing::Test {
                                                         {0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5},
                                                         {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}};
   const SurfaceCurvature curvature_{vertices_, triangles_};
-  const SharpEdges edges_{vertices_, curvature_.sharp_edges()};
+  const SharpEdges edges_{curvature_};
 };
 
 TEST_F(SharpEdgesTest, ACubeHasTwelveAndNoDiagonals) {
@@ -57,6 +57,50 @@ TEST_F(SharpEdgesTest, AnEdgeThatIsNotWhereTheImpulseComesFromDoesNotCount) {
 
 TEST_F(SharpEdgesTest, AnEdgeFartherThanThreeTimesTheDepthDoesNotCount) {
   EXPECT_FALSE(edges_.Protruding({0, 0, -0.045}, 0.005, {0, 0, 1}));
+}
+
+TEST_F(SharpEdgesTest, AContactBesideACornerIsAtTheCorner) {
+  // As Havok rounds the corners of a face that lands flat.
+  const Point beside{-0.04913, -0.04913, -0.05};
+  const auto found = edges_.Beside(beside, 0.002, {0, 0, 1});
+  ASSERT_TRUE(found);
+  for (const double coordinate : *found) EXPECT_NEAR(coordinate, -0.05, kTiny);
+  EXPECT_FALSE(edges_.Beside(beside, 0.0005, {0, 0, 1}));
+  EXPECT_FALSE(edges_.Beside({-0.047, -0.047, -0.05}, 0.002, {0, 0, 1}));
+}
+
+TEST_F(SharpEdgesTest, AContactBesideAnEdgeIsOnTheEdge) {
+  const auto found = edges_.Beside({-0.049, 0.01, -0.05}, 0.002, {0, 0, 1});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((*found)[0], -0.05, kTiny);
+  EXPECT_NEAR((*found)[1], 0.01, kTiny);
+}
+
+TEST_F(SharpEdgesTest, AnEdgeBehindTheStruckSurfaceDoesNotCount) {
+  // The top of a thin plate is no place of a contact from below.
+  EXPECT_FALSE(edges_.Beside({-0.05, 0.01, 0.049}, 0.002, {0, 0, 1}));
+  EXPECT_TRUE(edges_.Beside({-0.05, 0.01, 0.049}, 0.002, {0, 0, -1}));
+}
+
+TEST_F(SharpEdgesTest, ManyEdgesAreSearchedAsFew) {
+  // A comb of 500 cubes along x; the edges of each are found among the others'.
+  std::vector<std::array<float, 3>> vertices;
+  std::vector<std::array<uint32_t, 3>> triangles;
+  for (uint32_t cube = 0; cube < 500; ++cube) {
+    for (const auto& [a, b, c] : triangles_) {
+      triangles.push_back({a + 8 * cube, b + 8 * cube, c + 8 * cube});
+    }
+    for (const auto& [x, y, z] : vertices_) {
+      vertices.push_back({x + 0.2F * static_cast<float>(cube), y, z});
+    }
+  }
+  const SurfaceCurvature curvature(vertices, triangles);
+  const SharpEdges comb(curvature);
+  for (const double cube : {0.0, 211.0, 499.0}) {
+    const auto found = comb.Beside({0.2 * cube - 0.049, -0.049, -0.05}, 0.002, {0, 0, 1});
+    ASSERT_TRUE(found) << cube;
+    EXPECT_NEAR((*found)[0], 0.2 * cube - 0.05, 1e-5);
+  }
 }
 
 }  // namespace

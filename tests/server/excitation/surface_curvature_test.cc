@@ -117,6 +117,44 @@ TEST(SurfaceCurvature, ABoxIsFlatOnItsFacesAndSharpAtItsEdgesAndCorners) {
   EXPECT_EQ(curvature.At(0, {0.0001, 0.03, 0}, 10), 0);
 }
 
+TEST(SurfaceCurvature, ACornerIsSharpOnEachOfItsTriangles) {
+  // Up to rounding, any of them is the nearest to a contact at the corner.
+  const Mesh mesh = Box();
+  const SurfaceCurvature curvature = CurvatureOf(mesh);
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const uint32_t vertex : mesh.triangles[t]) {
+      const auto& [x, y, z] = mesh.vertices[vertex];
+      EXPECT_DOUBLE_EQ(curvature.At(t, {x, y, z}, 1), 1 / kEdgeRadiusM) << t << ", " << vertex;
+    }
+  }
+}
+
+TEST(SurfaceCurvature, ARimThatTurnsGraduallyHasNoCorners) {
+  // A cylinder of 48 sides, closed by fans: the rims are edges everywhere.
+  Mesh mesh;
+  constexpr uint32_t kSides = 48;
+  for (uint32_t side = 0; side < kSides; ++side) {
+    const double angle = 2 * kPi * side / kSides;
+    for (const float z : {0.0F, 0.1F}) {
+      mesh.vertices.push_back({static_cast<float>(0.1 * std::cos(angle)),
+                               static_cast<float>(0.1 * std::sin(angle)), z});
+    }
+  }
+  mesh.vertices.push_back({0, 0, 0});
+  mesh.vertices.push_back({0, 0, 0.1F});
+  for (uint32_t side = 0; side < kSides; ++side) {
+    const uint32_t a = 2 * side, b = 2 * ((side + 1) % kSides);
+    mesh.triangles.insert(
+        mesh.triangles.end(),
+        {{a, b, a + 1}, {b, b + 1, a + 1}, {b, a, 2 * kSides}, {a + 1, b + 1, 2 * kSides + 1}});
+  }
+  const SurfaceCurvature curvature = CurvatureOf(mesh);
+  for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [x, y, z] = mesh.vertices[mesh.triangles[t][0]];
+    EXPECT_DOUBLE_EQ(curvature.At(t, {x, y, z}, 1), 0.5 / kEdgeRadiusM) << t;
+  }
+}
+
 TEST(SurfaceCurvature, AnInnerEdgeIsNotSharp) {
   Mesh mesh = Box();
   mesh.TurnInsideOut();

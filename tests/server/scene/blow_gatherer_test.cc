@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -433,6 +434,54 @@ TEST(BlowGatherer, AFallIsOneBlowOfItsImpulseAndLengthAtEveryStepOfTheEngine) {
       }
     }
   }
+}
+
+/// A body of 1 kg lands with 4 N s at once on `vertices`. Each contact alone would last 1 ms.
+std::vector<ForceEvent> Landing(const std::vector<uint32_t>& vertices) {
+  BlowGatherer gatherer(kStepS);
+  gatherer.Begin(0);
+  gatherer.End();
+  gatherer.Begin(1);
+  for (const uint32_t vertex : vertices) {
+    SurfaceImpulse impulse{
+        .at = {.vertices = {9, vertex, 8}, .weights = {0, 1, 0}},
+        .impulse_newton_seconds = {0, 0, 4.0F / static_cast<float>(vertices.size())},
+        .pulse = Pulse::RaisedCosine(1e-3F)};
+    BodyImpulses impulses = ImpulseOn(3, impulse);
+    impulses.by[0].collision.reduced_mass_kg = 1;
+    impulses.duration_follows_impulse = true;
+    gatherer.Touch({.contact = {.handle = 3}}, impulses);
+  }
+  const BlowGatherer::Events events = gatherer.End();
+  std::vector<ForceEvent> blows;
+  std::ranges::copy_if(events, std::back_inserter(blows), [](const ForceEvent& event) {
+    return std::holds_alternative<SurfaceImpulse>(event.action);
+  });
+  return blows;
+}
+
+double DurationS(const ForceEvent& blow) {
+  return double{std::get<SurfaceImpulse>(blow.action).pulse.duration_s()};
+}
+
+TEST(BlowGatherer, CornersThatLandTogetherShareTheMassAndHaveOneSpeed) {
+  const std::vector<ForceEvent> blows = Landing({0, 1, 2, 3});
+  ASSERT_EQ(blows.size(), 4U);
+  for (const ForceEvent& blow : blows) {
+    // T = 2.87 (m^2/(R E^2 v))^(1/5): a quarter of the mass, and four times the speed J/(2 m).
+    EXPECT_NEAR(DurationS(blow), 1e-3 * std::pow(1.0 / 16 / 4, 0.2), 1e-9);
+    EXPECT_DOUBLE_EQ(blow.collision.reduced_mass_kg, 0.25);
+  }
+}
+
+TEST(BlowGatherer, ContactsAtOnePlaceAreOneContact) {
+  // An engine may report the contact of a corner once for each triangle of the floor.
+  const std::vector<ForceEvent> blows = Landing({1, 1});
+  ASSERT_EQ(blows.size(), 2U);
+  for (const ForceEvent& blow : blows) {
+    EXPECT_NEAR(DurationS(blow), 1e-3 * std::pow(1.0 / 2, 0.2), 1e-9);
+  }
+  EXPECT_NEAR(DurationS(Landing({1}).at(0)), 1e-3, 1e-9);
 }
 
 TEST(BlowGatherer, ABodyThatIsPutDownGentlyDoesNotStrike) {
