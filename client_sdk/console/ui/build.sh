@@ -44,7 +44,7 @@ bundle . src/trace_file.tsx --legal-comments=inline
 bundle web src/web.ts src/listen_worker.ts --splitting --chunk-names=shared
 bundle web src/player_worklet.ts
 node node_modules/typescript/bin/tsc --project tsconfig.web.json
-for package in three three-mesh-bvh preact @preact/signals{,-core} @bufbuild/protobuf @connectrpc/connect; do
+for package in three preact @preact/signals{,-core} @bufbuild/protobuf @connectrpc/connect; do
   printf '%s\n\n' "$package"
   cat "node_modules/$package"/LICENSE* 2>/dev/null ||
     sed -n 's/^ *"license": *//p' "node_modules/$package/package.json"

@@ -2,9 +2,9 @@
 // The body in 3D: one mode, or a strike in slow motion, as displacement and colour; points are picked on the body at rest.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import { MeshBVH, acceleratedRaycast } from 'three-mesh-bvh';
 import { DrawBudget } from './draw_budget';
 import type { ModalModel, SoundingMode } from './modal_model';
+import { firstHit } from './raycast';
 
 /** The largest displacement, as a share of the body's extent. */
 const BEND = 0.05;
@@ -33,7 +33,6 @@ export class BodyView {
   private model?: ModalModel;
   private readonly marks = new THREE.Group();
   private body?: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
-  private rest?: THREE.Mesh;
   private extent = 1;
   private weights: Weight[] = [];
   /** The newest animation that was asked for; its shapes may still be on the way. */
@@ -92,9 +91,8 @@ export class BodyView {
     this.dirty = true;
     if (this.body) this.scene.remove(this.body);
     this.body?.geometry.dispose();
-    this.rest?.geometry.dispose();
     this.marks.clear();
-    this.model = this.rest = undefined;
+    this.model = undefined;
     this.weights = [];
     this.wanted = {};
   }
@@ -108,15 +106,9 @@ export class BodyView {
     geometry.setAttribute('position', new THREE.BufferAttribute(model.vertices.slice(), 3));
     geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(model.vertices.length).fill(0.75), 3));
     this.body = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, flatShading: true, roughness: 0.6 }));
-    const restGeometry = new THREE.BufferGeometry();
-    restGeometry.setIndex(new THREE.BufferAttribute(model.triangles.slice(), 1));
-    restGeometry.setAttribute('position', new THREE.BufferAttribute(model.vertices, 3));
-    restGeometry.boundsTree = new MeshBVH(restGeometry, { indirect: true });
-    this.rest = new THREE.Mesh(restGeometry);
-    this.rest.raycast = acceleratedRaycast;
     this.scene.add(this.body);
     // The fine model takes the coarse one's place without a jump.
-    if (!again) this.lookAt(restGeometry);
+    if (!again) this.lookAt(geometry);
     this.paint();
   }
 
@@ -143,35 +135,41 @@ export class BodyView {
 
   /** The vertex nearest to a ray through a place of the canvas, -1 to 1 each way. */
   pick(x: number, y: number): Strike | undefined {
-    if (!this.rest || !this.model) return undefined;
-    const ray = new THREE.Raycaster();
-    ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
-    const [hit] = ray.intersectObject(this.rest);
-    if (!hit?.face) return undefined;
-    const corners = [hit.face.a, hit.face.b, hit.face.c];
-    const distance = (vertex: number) => hit.point.distanceTo(new THREE.Vector3().fromArray(this.model!.vertices, 3 * vertex));
-    const vertex = corners.reduce((best, corner) => (distance(corner) < distance(best) ? corner : best));
-    return { vertex, point: hit.point.toArray(), normal: hit.face.normal.toArray() };
+    if (!this.model) return undefined;
+    const from = this.camera.position;
+    this.camera.updateMatrixWorld();
+    const direction = new THREE.Vector3(x, y, 0.5).unproject(this.camera).sub(from);
+    const hit = firstHit(this.model.vertices, this.model.triangles, from.toArray(), direction.toArray());
+    if (!hit) return undefined;
+    const point = new THREE.Vector3(...hit.point);
+    const vertex = this.corners(hit.triangle).reduce((best, corner) => (this.place(corner).distanceTo(point) < this.place(best).distanceTo(point) ? corner : best));
+    return { vertex, point: hit.point, normal: this.normalOf(hit.triangle) };
   }
 
   /** The point that is farthest from the body's middle, along the normal there. */
   outermost(): Strike | undefined {
-    const geometry = this.rest?.geometry;
-    if (!geometry?.boundingSphere) return undefined;
-    const places = geometry.getAttribute('position') as THREE.BufferAttribute;
-    const { center } = geometry.boundingSphere;
-    const point = new THREE.Vector3(), farthest = new THREE.Vector3().copy(center);
-    let vertex = 0;
-    for (let i = 0; i < places.count; i += 1) {
-      point.fromBufferAttribute(places, i);
-      if (point.distanceToSquared(center) <= farthest.distanceToSquared(center)) continue;
-      farthest.copy(point);
-      vertex = i;
+    const center = this.body?.geometry.boundingSphere?.center;
+    if (!center || !this.model) return undefined;
+    let vertex = 0, farthest = 0;
+    for (let i = 0; i < this.model.vertices.length / 3; i += 1) {
+      const distance = this.place(i).distanceToSquared(center);
+      if (distance > farthest) { farthest = distance; vertex = i; }
     }
-    const triangle = (geometry.index!.array as Uint32Array).indexOf(vertex);
-    const corner = (k: number) => new THREE.Vector3().fromBufferAttribute(places, geometry.index!.getX(triangle - triangle % 3 + k));
-    const normal = new THREE.Triangle(corner(0), corner(1), corner(2)).getNormal(new THREE.Vector3());
-    return { vertex, point: farthest.toArray(), normal: normal.toArray() };
+    return { vertex, point: this.place(vertex).toArray(), normal: this.normalOf(Math.floor(this.model.triangles.indexOf(vertex) / 3)) };
+  }
+
+  /** A vertex of the body at rest. */
+  private place(vertex: number): THREE.Vector3 {
+    return new THREE.Vector3().fromArray(this.model!.vertices, 3 * vertex);
+  }
+
+  private corners(triangle: number): number[] {
+    return [...this.model!.triangles.subarray(3 * triangle, 3 * triangle + 3)];
+  }
+
+  private normalOf(triangle: number): Strike['normal'] {
+    const [a, b, c] = this.corners(triangle).map((corner) => this.place(corner));
+    return new THREE.Triangle(a, b, c).getNormal(new THREE.Vector3()).toArray();
   }
 
   turn(right: number, up: number): void {
