@@ -7,9 +7,6 @@ import * as state from './state';
 import { services, strikeToRender } from './state';
 
 const FLOAT = 3;
-/** The longest tail that the daemon renders, s. */
-const LONGEST_S = 120;
-const FADE_S = 0.05, CUT_FADE_S = 2;
 
 /** A WAV file of 32-bit float samples. */
 export function waveFile(blocks: Uint8Array[], sampleRateHz: number, channels: number): Blob {
@@ -23,25 +20,12 @@ export function waveFile(blocks: Uint8Array[], sampleRateHz: number, channels: n
   return new Blob([head, ...blocks.map((block) => new Uint8Array(block))], { type: 'audio/wav' });
 }
 
-/** Ends a sound where it has fallen 60 dB below its peak for good, with a fade, which is longer where it still rings. */
-function ended(samples: Float32Array, rateHz: number): Float32Array {
-  const peak = samples.reduce((most, sample) => Math.max(most, Math.abs(sample)), 0);
-  const last = samples.findLastIndex((sample) => Math.abs(sample) > peak / 1000) + 1;
-  const rings = samples.length - last < rateHz / 10;
-  const kept = samples.slice(0, rings ? samples.length : last + Math.round(FADE_S * rateHz));
-  const fade = Math.min(kept.length, Math.round((rings ? CUT_FADE_S : FADE_S) * rateHz));
-  for (let i = 1; i <= fade; i += 1) kept[kept.length - i]! *= (i - 1) / fade;
-  return kept;
-}
-
-/** Renders the last strike, until it has fallen by 60 dB, and saves it under the names of the body and its material. */
+/** Renders the last strike, until it has fallen by 60 dB or for a minute, and saves it under the names of the body and its material. */
 export async function saveStrike(): Promise<void> {
   const { point: [px, py, pz], impulse: [x, y, z], striker, ...object } = strikeToRender();
   const name = `${state.nameOf(state.model.value!.summary)}_${state.materialName.value}`;
-  // No sum of modes falls more slowly than the slowest of them.
-  const tailS = Math.min(LONGEST_S, Math.max(0.5, ...state.modes.value.map((mode) => mode.t60S)) + 0.2);
   async function* trace(): AsyncGenerator<MessageInitShape<typeof RenderRequestSchema>> {
-    yield { request: { case: 'settings' as const, value: { tailS } } };
+    yield { request: { case: 'settings' as const, value: {} } };
     const records: MessageInitShape<typeof ContactTraceRecordSchema>['record'][] = [
       { case: 'header' as const, value: { formatVersion: 1, simulator: 'carillon-console' } },
       { case: 'object' as const, value: { handle: 1, ...object } },
@@ -57,9 +41,7 @@ export async function saveStrike(): Promise<void> {
     if (response.case === 'format') ({ sampleRateHz: rate, channelCount: channels } = response.value);
     if (response.case === 'block') blocks.push(response.value.samples);
   }
-  const all = new Uint8Array(await new Blob(blocks.map((block) => new Uint8Array(block))).arrayBuffer());
-  const sound = ended(new Float32Array(all.buffer), rate);
-  saveAs(waveFile([new Uint8Array(sound.buffer)], rate, channels), `${name.replace(/[^\w.-]+/g, '_')}.wav`);
+  saveAs(waveFile(blocks, rate, channels), `${name.replace(/[^\w.-]+/g, '_')}.wav`);
 }
 
 export function saveAs(file: Blob, name: string): void {
