@@ -4,7 +4,7 @@ import { computed, effect, signal } from '@preact/signals';
 import type { Blow } from './gen/carillon/v1/audio_service_pb';
 import type { StreamContactsResponse } from './gen/carillon/v1/contact_service_pb';
 import type { Scene, SoundingObject } from './gen/carillon/v1/scene_service_pb';
-import { hasDevice, heardScene, player, playerChanged, sounding } from './sounding';
+import { gapsOf, hasDevice, heardScene, player, playerChanged, sounding } from './sounding';
 import * as state from './state';
 
 const POSE_PERIOD_MS = 66, STATE_PERIOD_MS = 500, TELL_PERIOD_MS = 150;
@@ -21,7 +21,8 @@ export interface SeenStream { report: StreamContactsResponse; seenMs: number; en
 
 /** Whether the view is shown; nothing is asked of the daemon while it is not. */
 export const watching = signal(false);
-export const scenes = signal<Scene[]>([]);
+/** Unset until the daemon has been asked. */
+export const scenes = signal<Scene[] | undefined>(undefined);
 export const sceneName = signal('');
 /** Whether the user chose the scene, so that another is not chosen for them. */
 export const chosenByHand = signal(false);
@@ -34,7 +35,7 @@ export const lostCount = signal(0n);
 /** When the scene was last loud enough to hear, as far as the page has seen. */
 let heardMs = 0;
 
-export const scene = computed(() => scenes.value.find((one) => one.name === sceneName.value));
+export const scene = computed(() => scenes.value?.find((one) => one.name === sceneName.value));
 
 /** How far before a place of the spectrogram, whose columns have 85 ms of sound, its blow lies at most. */
 const WINDOW_S = 0.25;
@@ -71,6 +72,7 @@ export const decibels = (amplitude: number) => `${(20 * Math.log10(Math.max(ampl
 export const chain = computed<Link[]>(() => {
   playerChanged.value;
   const one = scene.value;
+  if (!scenes.value) return [];
   if (!one) return [{ name: 'Scene', state: 'broken', says: 'No scene is there. A simulator makes one when it connects to this daemon.' }];
   return [bodiesOf(one), stepsOf(), contactsOf(), soundOf(one), volumeOf(one), outputOf(), deviceOf(), browserOf()];
 });
@@ -129,7 +131,7 @@ function volumeOf(one: Scene): Link {
     state.services.scenes.updateScene({ name: one.name, ...change }));
   const name = 'Scene’s volume';
   if (one.muted) return { name, state: 'broken', says: 'The scene is muted.', remedy: { text: 'Unmute', act: update({ muted: false }) } };
-  const solo = scenes.value.find((other) => other.solo);
+  const solo = scenes.value?.find((other) => other.solo);
   if (solo && !one.solo) return { name, state: 'broken', says: `Only ${solo.name} is heard: it is solo.`,
     remedy: { text: 'End solo', act: () => void state.attempt('', () => state.services.scenes.updateScene({ name: solo.name, solo: false })) } };
   if (one.gain === 0) return { name, state: 'broken', says: 'Its gain is 0.', remedy: { text: 'Set it to 1', act: update({ gain: 1 }) } };
@@ -161,7 +163,7 @@ function browserOf(): Link {
   const name = 'This browser';
   if (!sounding.value) return { name, state: hasDevice() ? 'unknown' : 'broken', says: 'Sound here is off (the button above).' };
   const heard = heardScene.value || 'the output';
-  return { name, state: player.volumeDb ? 'well' : 'unknown', says: `plays ${heard}; ${player.underruns} gaps, ${player.lostFrames} frames lost` };
+  return { name, state: player.volumeDb ? 'well' : 'unknown', says: `plays ${heard}; ${gapsOf(player.underruns)}, ${player.lostFrames} frames lost` };
 }
 
 /** Asks again and again while `active` holds; a daemon that is away is asked later. */
@@ -176,7 +178,7 @@ function repeat(periodMs: number, work: () => Promise<void>): void {
 /** The scene of another program that is connected and has bodies, if there is one. */
 function likeliest(): Scene | undefined {
   const worth = (one: Scene) => (one.name === state.sceneName() ? 0 : 4) + (one.connectionCount || one.keep ? 2 : 0) + (one.objectCount ? 1 : 0);
-  return [...scenes.value].sort((a, b) => worth(b) - worth(a))[0];
+  return [...scenes.value!].sort((a, b) => worth(b) - worth(a))[0];
 }
 
 repeat(STATE_PERIOD_MS, async () => {

@@ -39,6 +39,8 @@ export async function hear(scene: string): Promise<void> {
   sound(scene);
 }
 
+export const gapsOf = (count: number) => `${count} ${count === 1 ? 'gap' : 'gaps'}`;
+
 /** Whether the daemon plays on a sound card itself. */
 export const hasDevice = () => !/^(null|file)/.test(mixer.value?.device ?? 'null');
 

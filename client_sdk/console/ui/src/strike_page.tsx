@@ -28,7 +28,7 @@ function Body() {
     return () => ends.forEach((end) => end());
   }, []);
   return <canvas ref={canvas} class="body" tabIndex={0} onKeyDown={keyOnBody} role="application"
-    aria-label="The body. Arrows turn it, Shift with arrows moves the point, Space strikes." />;
+    aria-label="The body. Arrows turn it, Shift with arrows moves the point, Control makes the steps finer, Space strikes." />;
 }
 
 /** Shows the file that is being made a model, until there is one, and where a refusal says it is wrong. */
@@ -69,8 +69,9 @@ const cursor = { x: 0, y: 0 };
 
 function keyOnBody(event: KeyboardEvent) {
   const step = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] } as Record<string, [number, number]>)[event.key];
+  const share = event.ctrlKey ? 0.1 : 1;
   if (step && event.shiftKey) {
-    const next = { x: cursor.x + 0.02 * step[0], y: cursor.y + 0.02 * step[1] };
+    const next = { x: cursor.x + 0.02 * share * step[0], y: cursor.y + 0.02 * share * step[1] };
     const at = view?.pick(next.x, next.y);
     if (at) {
       Object.assign(cursor, next);
@@ -78,7 +79,7 @@ function keyOnBody(event: KeyboardEvent) {
       view?.mark(at);
       void state.readRow(at);
     }
-  } else if (step) view?.turn(0.1 * step[0], 0.1 * step[1]);
+  } else if (step) view?.turn(0.1 * share * step[0], 0.1 * share * step[1]);
   else if (event.key === ' ') {
     const at = view?.pick(cursor.x, cursor.y) ?? state.strike.value;
     if (at) void strikeAndShow(at);
