@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The console in Chromium: how long from the command to a heard strike, from a click to the sound, how much CPU a
-sounding scene takes and how many gaps it has, and how soon a large model is seen.
+sounding scene takes and how many gaps it has, how soon a large model is seen, and how soon all is back after the daemon
+was killed.
 
 The daemon has the null device, so that the page plays. measure.js drives the browser.
 """
@@ -11,6 +12,7 @@ import contextlib
 import json
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
@@ -18,7 +20,7 @@ import threading
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).resolve().parent
-NAMES = ("first", "clicks", "scene", "large")
+NAMES = ("first", "clicks", "scene", "large", "restart")
 LARGE = (250, 400, 800)  # vertices along and around, modes
 
 
@@ -83,6 +85,20 @@ def simulator(server, mesh):
     thread.join()
 
 
+@contextlib.contextmanager
+def restarted(daemon):
+    """Starts the daemon again once it has been killed."""
+
+    def restart():
+        if daemon.process.wait() == -signal.SIGKILL:
+            daemon.start()
+
+    thread = threading.Thread(target=restart)
+    thread.start()
+    yield
+    thread.join()
+
+
 class Browser:
     """measure.js, which runs `carillon console` and Chromium."""
 
@@ -137,6 +153,9 @@ def main():
                 daemon.command("model", "import", "--label", "large", "--material", "structural_steel",
                                folder / "large.npz")
                 browser.print_all("large")
+            if "restart" in options.only:
+                with restarted(daemon):
+                    browser.print_all("restart", MESH=bar)
         finally:
             daemon.stop()
 
