@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recipes of docs/: the program of each page runs as the page says, with a real daemon."""
 
+import base64
+import json
 import os
 import pathlib
 import re
@@ -92,6 +94,43 @@ class RecipesTest(DaemonTest):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertRegex(done.stdout, r"blowCount: [1-9]")
         self.assertGreater(numpy.abs(sound.read_wave(self.folder / "rod.wav")).max(), 1e-4)
+
+    def test_mcap(self):
+        self.save("recipe_mcap.md", "js", "mcap.js")
+        with carillon.connect(self.daemon.server) as c:
+            bar = c.create_model(self.folder / "bar.obj", material="brass")
+            bar.wait_for_transfer()
+            trace = carillon.Trace(1 / 240)
+            handle = trace.add(bar)
+            trace.step(0.25, impacts=carillon.Impacts(handle, (0.1, 0.015, 0.008), (0, 0, -0.02), durations=0.0005))
+            trace.write(self.folder / "drop.contacts")
+            heard = c.render(trace)
+        modules = self.folder / "mcap_modules"
+        modules.mkdir()
+        (modules / "carillon").symlink_to(ROOT / "client_sdk/node")
+        environment = {**self.environment, "NODE_PATH": f"{modules}:{os.environ['CARILLON_NODE_MODULES']}"}
+        reader = pathlib.Path(__file__).with_name("read_mcap.js")
+        for words in (["mcap.js", "drop.contacts", "drop.mcap", "1764417600"], [reader, "drop.mcap"]):
+            done = subprocess.run(["node", *words], cwd=self.folder, env=environment, check=False,
+                                  capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+        messages = json.loads(done.stdout)
+        audio = [message for message in messages if message["topic"] == "/sound"]
+        (impact,) = (message for message in messages if message["topic"] == "/impacts")
+        self.assertEqual({message["schema"] for message in audio}, {"foxglove.RawAudio"})
+        levels = [numpy.frombuffer(base64.b64decode(message["data"]), "<i2") / 32767 for message in audio]
+        numpy.testing.assert_allclose(numpy.concatenate(levels), heard.mono, rtol=0, atol=0.51 / 32767)
+        self.assertEqual({(message["format"], message["sample_rate"], message["number_of_channels"])
+                          for message in audio}, {("pcm-s16", 48000, 1)})
+        for number, message in enumerate(audio):
+            seconds, milliseconds = divmod(20 * number, 1000)
+            self.assertEqual(message["timestamp"], {"sec": 1764417600 + seconds, "nsec": 10**6 * milliseconds})
+            self.assertEqual(message["logTime"], f"{1764417600 + seconds}{milliseconds:03d}000000")
+        self.assertEqual((impact["schema"], impact["object"]), ("carillon.Impact", handle))
+        self.assertAlmostEqual(int(impact["logTime"]) / 1e9 - 1764417600, 0.25, delta=1e-4)
+        self.assertAlmostEqual(impact["impulse_newton_seconds"]["z"], -0.02, places=6)
+        self.assertAlmostEqual(impact["point_m"]["x"], 0.1, places=6)
+        self.assertAlmostEqual(impact["duration_s"], 0.0005, places=8)
 
     def test_sampler(self):
         self.run_python("recipe_sampler.md")
