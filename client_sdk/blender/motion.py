@@ -110,7 +110,7 @@ def _read_simulated(scene, objects, free, tell):
                                  n)
         apart = numpy.abs(fine[:, ::n] - seen[rows, start - begin:]).max((0, 2, 3))
         alike = apart.max() <= ALIKE_M / settings.metres_per_unit(bpy.context.scene)
-        how = _comparison(apart, start, alike)
+        how = _comparison(apart, start, alike, "each step" if n == steps else f"{n} steps for each frame")
         if alike:
             matrices = _between(seen, n)
             matrices[rows, (start - begin) * n:] = fine
@@ -118,13 +118,13 @@ def _read_simulated(scene, objects, free, tell):
     return Motion(surfaces, matrices[:, (shown - begin) * n:], n * rate, how, n == steps)
 
 
-def _comparison(apart, start, alike):
+def _comparison(apart, start, alike, steps):
     if apart.max() == 0:
-        return "each step of the simulation, bit for bit the same animation"
+        return f"{steps} of the simulation, bit for bit the same animation"
     first = start + numpy.argmax(apart > 0)
     if alike:
-        return f"each step of the simulation, which differs by up to {apart.max():.2g} from frame {first} on"
-    return f"the frames alone, since simulating each step gave another animation from frame {first} on"
+        return f"{steps} of the simulation, which differs by up to {apart.max():.2g} from frame {first} on"
+    return f"the frames alone, since simulating {steps} gave another animation from frame {first} on"
 
 
 def _between(seen, n):

@@ -49,7 +49,8 @@ class CarillonScene(bpy.types.PropertyGroup):
                              description="How much the force of what slides fluctuates, relative to itself")
     sub_frames: IntProperty(
         name="Sub-frames", default=0, min=0, max=100, update=changed,
-        description="Poses for each frame. 0: each step of the simulation; of keys, as dense as they are")
+        description="Poses for each frame. 0: each step of the simulation, up to 1000 poses a second; of keys, as "
+                    "dense as they are")
     stems: BoolProperty(name="Stems", update=changed,
                         description="Put the sound of each object, muted, on a channel of its own, too")
     channel: IntProperty(name="Strip Channel", default=1, min=1, max=32,

@@ -148,7 +148,7 @@ def write_wave(path, sound):
 
 
 def loudest_frequency_hz(sound):
-    """The highest peak of the spectrum of the first channel; None without numpy."""
+    """Returns the frequency at which the first channel is loudest, or None without numpy."""
     try:
         import numpy
     except ImportError:

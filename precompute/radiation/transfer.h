@@ -42,10 +42,11 @@ struct Transfer {
 /// Called with the estimated fraction of the work that is done, 0 to 1.
 using RadiationProgress = std::function<void(double fraction)>;
 
-/// Solves for the radiation of each mode at its own wavenumber, in the order of SortByNeed. If the
-/// budget allows, each mode is solved on at least two surfaces, one 1.41 times as fine as the
-/// other, and the error is estimated from their difference. The rigid motions of the body are
-/// solved first if they take at most a quarter of the budget.
+/// Solves for the radiation of each mode within the bounds of the settings, the most needed modes
+/// (SortByNeed) first. Two modes whose wavenumbers differ by less than 0.2 % share their mean
+/// wavenumber. If the budget allows, each mode is solved on at least two surfaces, one 1.41 times
+/// as fine as the other, and the error is estimated from their difference. The rigid motions of the
+/// body are solved first if they take at most a quarter of the budget.
 ///
 /// Errors: those of MakeRemeshedSurface.
 absl::StatusOr<Transfer> ComputeTransfer(const SurfaceModes& modes,

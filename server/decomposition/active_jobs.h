@@ -71,7 +71,8 @@ class ActiveJobs {
   Notice AnnounceRun(const std::string& digest);
 
   /// Returns the digests of running transfers to cancel, so that the next decomposition gets their
-  /// memory. They are marked as yielding.
+  /// memory. They are marked as yielding, except those that are to end
+  /// anyway.
   std::vector<std::string> BeginYielding();
 
   /// Records the progress of a run. The node count of the mesh, once it is known, predicts the

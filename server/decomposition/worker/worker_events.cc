@@ -13,8 +13,8 @@ constexpr size_t kMaxVarintBytes = 5;
 absl::Status Garbage() {
   return Refusal(
       absl::StatusCode::kDataLoss, "WORKER_CRASHED",
-      "the decomposing process wrote to its event pipe what is no event: this is a fault "
-      "in it; report it with the mesh");
+      "the decomposing process has a fault: it wrote what is no event to its event pipe; "
+      "report this with the mesh");
 }
 
 }  // namespace

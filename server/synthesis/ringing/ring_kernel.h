@@ -59,10 +59,10 @@ struct FreeBlock {
 bool RingFreely(LaneArrays& lanes, std::span<RingingSegment> segments,
                 const FreeBlock& block) noexcept;
 
-/// A part of a block, for all lanes, with the impulses that fall into it. Tiles begin anew with the
-/// part. The batch's states are those at the impulses' frames; in longer tiles, those at the start
-/// of the impulse's tile. In longer tiles each impulse has nodes of its own (StrikeBatch::nodes),
-/// because only the frames after it are audible.
+/// Says which part of a block all lanes render, and which impulses fall into that part. Tiles begin
+/// anew with the part. The batch's states are those at the impulses' frames; in longer tiles, those
+/// at the start of the impulse's tile. In longer tiles each impulse has nodes of its own
+/// (StrikeBatch::nodes), because only the frames after it are audible.
 struct StruckPart {
   TileSums sums;
   Gains gains{};     ///< for HearStruck only

@@ -39,8 +39,8 @@ def connect(server: Optional[str] = None, *, tls_roots: str | os.PathLike[str] |
 
 
 class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording, AnyPerformance]):
-    """A connection, as a context manager closed at the end. The attributes *_stub are the services of the contract,
-    for calls that have no method here."""
+    """A connection, as a context manager closed at the end. The attributes *_stub are all services of the contract
+    but AdminService, for calls that have no method here."""
 
     _model_kind: type[AnyModel]
     _job_kind: type[AnyJob]

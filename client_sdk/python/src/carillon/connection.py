@@ -39,8 +39,8 @@ class _Authorized:
 
 
 class Connection(Block):
-    """A connection, which opens at its first call. The attributes *_stub are the services of the contract, for calls
-    that have no method here."""
+    """A connection, which opens at its first call. The attributes *_stub are all services of the contract but
+    AdminService, for calls that have no method here."""
 
     is_awaited: bool
 

@@ -30,8 +30,8 @@ Body = Union[str, Any]  # a Model, or what names one on the command line
 
 @dataclasses.dataclass(frozen=True)
 class Line:
-    """A line of a recording, with standard errors. `near_room`: it decays about as fast as the room. Where a mode of
-    the model, counted from 1, explains it, the last four fields say how."""
+    """A line of a recording, with standard errors. `near_room`: it decays about as fast as the room. If a mode of
+    the model explains it, `mode` (from 1) and the fields after it say how."""
 
     frequency_hz: float
     frequency_error_hz: float
