@@ -202,9 +202,10 @@ absl::Status RunConsole(const Program& program, const ConsoleOptions& options,
 absl::Status ListScenes(const client::Client& daemon, bool json);
 /// Deletes a scene, which `text` names as "scenes/7" or "7".
 absl::Status DeleteScene(const client::Client& daemon, const std::string& text, bool json);
-/// Writes the OBJ file of an example; `path` may be empty for the name of the example. Errors:
-/// Internal (OUTPUT_NOT_WRITABLE).
-absl::Status WriteExample(const Example& example, const std::string& path, bool json);
+/// Writes the OBJ file of an example, stretched to `size_m` if that is not empty (WrittenExample).
+/// `path` may be empty for the name of the example. Errors: Internal (OUTPUT_NOT_WRITABLE).
+absl::Status WriteExample(const Example& example, const std::vector<double>& size_m,
+                          const std::string& path, bool json);
 absl::Status WatchJob(const client::Client& daemon, const std::string& text, bool json);
 /// Prints the jobs that wait or run, and then each job that matches when its state changes, or with
 /// `json` at each change, as long as somebody reads.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -134,27 +135,48 @@ ExampleBody DrawChime() {
 
 const std::vector<Example>& Examples() {
   static const auto* const examples = new std::vector<Example>{
-      {"bell", "a bronze bell, 12 cm wide", "bell_bronze",
-       "--point 0.06,0,0.005 --impulse -0.02,0,0", DrawBell},
-      {"bowl", "a porcelain bowl, 16 cm wide", "porcelain",
-       "--point 0.08,0,-0.005 --impulse -0.01,0,0", DrawBowl},
-      {"bar", "a bar of a xylophone, 20 cm long", "maple",
-       "--point 0.1,0.015,0.008 --impulse 0,0,-0.02", DrawBar},
-      {"chime", "an aluminum tube of a wind chime, 40 cm long", "chime_aluminum",
-       "--point 0.0125,0,0 --impulse -0.01,0,0", DrawChime}};
+      {"bell", "a bronze bell, 12 cm wide", "bell_bronze", {0.06, 0, 0.005}, "-0.02,0,0", DrawBell},
+      {"bowl",
+       "a porcelain bowl, 16 cm wide",
+       "porcelain",
+       {0.08, 0, -0.005},
+       "-0.01,0,0",
+       DrawBowl},
+      {"bar",
+       "a bar of a xylophone, 20 cm long",
+       "maple",
+       {0.1, 0.015, 0.008},
+       "0,0,-0.02",
+       DrawBar},
+      {"chime",
+       "an aluminum tube of a wind chime, 40 cm long",
+       "chime_aluminum",
+       {0.0125, 0, 0},
+       "-0.01,0,0",
+       DrawChime}};
   return *examples;
 }
 
-std::string ObjText(const Example& example) {
+ExampleFile WrittenExample(const Example& example, const std::vector<double>& size_m) {
   const ExampleBody body = example.draw();
+  std::array<double, 3> scale = {1, 1, 1};
+  for (size_t axis = 0; axis < size_m.size(); ++axis) {
+    const auto coordinate = [axis](const std::array<double, 3>& vertex) { return vertex[axis]; };
+    const auto [least, most] =
+        std::ranges::minmax(body.vertices | std::views::transform(coordinate));
+    scale[axis] = size_m[axis] / (most - least);
+  }
   std::string text = absl::StrCat("# ", example.description, "; coordinates are metres\n");
   for (const auto& [x, y, z] : body.vertices) {
-    absl::StrAppendFormat(&text, "v %.9g %.9g %.9g\n", x, y, z);
+    absl::StrAppendFormat(&text, "v %.9g %.9g %.9g\n", x * scale[0], y * scale[1], z * scale[2]);
   }
   for (const auto& [a, b, c] : body.triangles) {
     absl::StrAppend(&text, "f ", a + 1, " ", b + 1, " ", c + 1, "\n");
   }
-  return text;
+  const auto& [x, y, z] = example.point_m;
+  return {.obj = std::move(text),
+          .strike = absl::StrFormat("--point %.9g,%.9g,%.9g --impulse %s", x * scale[0],
+                                    y * scale[1], z * scale[2], example.impulse)};
 }
 
 }  // namespace carillon::cli

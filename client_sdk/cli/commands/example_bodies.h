@@ -14,19 +14,27 @@ struct ExampleBody {
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 
-/// A body that ships with the program, with the options that make it sound.
+/// A body that ships with the program, with a material and a strike that make it sound.
 struct Example {
   std::string name;
   std::string description;
   std::string material;
-  std::string strike;  ///< options of `carillon strike`
+  std::array<double, 3> point_m;  ///< of the strike, on the body as it is drawn
+  std::string impulse;            ///< of the strike, N s
   ExampleBody (*draw)();
 };
 
 /// All examples: bell, bowl, bar and chime.
 const std::vector<Example>& Examples();
 
-/// Returns the surface as an OBJ file.
-std::string ObjText(const Example& example);
+/// What an example is written as.
+struct ExampleFile {
+  std::string obj;
+  std::string strike;  ///< options of `carillon strike`
+};
+
+/// Returns the surface as an OBJ file and the strike. `size_m` are the lengths along x, y and z to
+/// which the body is stretched, metres; it is empty for the body as it is drawn.
+ExampleFile WrittenExample(const Example& example, const std::vector<double>& size_m);
 
 }  // namespace carillon::cli

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <map>
 
@@ -232,10 +233,12 @@ absl::Status DeleteScene(const client::Client& daemon, const std::string& text, 
   return absl::OkStatus();
 }
 
-absl::Status WriteExample(const Example& example, const std::string& path, bool json) {
+absl::Status WriteExample(const Example& example, const std::vector<double>& size_m,
+                          const std::string& path, bool json) {
   const std::string file = path.empty() ? example.name + ".obj" : path;
   std::ofstream out(file, std::ios::binary);
-  out << ObjText(example);
+  const ExampleFile written = WrittenExample(example, size_m);
+  out << written.obj;
   out.close();
   if (!out) {
     return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
@@ -245,15 +248,17 @@ absl::Status WriteExample(const Example& example, const std::string& path, bool 
     PrintJson({{"file", file},
                {"description", example.description},
                {"material", example.material},
-               {"strike", example.strike}});
+               {"strike", written.strike}});
     return absl::OkStatus();
   }
   absl::PrintF("%s\n", file);
   // To stderr, so that stdout is the name alone.
-  absl::FPrintF(stderr, "%s is %s. It sounds with:\n", file, example.description);
+  absl::FPrintF(stderr, "%s is %s%s. It sounds with:\n", file, example.description,
+                size_m.empty() ? "" : ", stretched");
   absl::FPrintF(stderr, "  carillon model create %s --material %s --wait\n", file,
                 example.material);
-  absl::FPrintF(stderr, "  carillon strike %s %s\n", example.name, example.strike);
+  absl::FPrintF(stderr, "  carillon strike %s %s\n", std::filesystem::path(file).stem().string(),
+                written.strike);
   return absl::OkStatus();
 }
 

@@ -159,6 +159,7 @@ void AddScenes(CLI::App& app, Program& program) {
 
 void AddExample(CLI::App& app, Program& program) {
   auto name = std::make_shared<std::string>();
+  auto size_m = std::make_shared<std::vector<double>>();
   auto out = std::make_shared<std::string>();
   std::vector<std::string> names;
   for (const Example& example : Examples()) names.push_back(example.name);
@@ -166,12 +167,20 @@ void AddExample(CLI::App& app, Program& program) {
   command.add_option("example", *name, "bell, bowl, bar or chime")
       ->required()
       ->check(CLI::IsMember(names));
+  command
+      .add_option("--size", *size_m,
+                  "Lengths along x, y and z to which the body is stretched, metres; "
+                  "bar --size 0.14,0.07,0.01 is a block")
+      ->type_name("X,Y,Z")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::PositiveNumber);
   command.add_option("--out", *out, "The OBJ file to write [NAME.obj]")
       ->check([](const std::string& path) { return WhyNotWritten(path, {".obj"}); });
-  command.callback([&program, name, out] {
-    program.command = [&program, name, out] {
+  command.callback([&program, name, size_m, out] {
+    program.command = [&program, name, size_m, out] {
       const Example& example = *std::ranges::find(Examples(), *name, &Example::name);
-      return WriteExample(example, *out, program.json);
+      return WriteExample(example, *size_m, *out, program.json);
     };
   });
 }

@@ -277,6 +277,10 @@ class JsonTest(CommandLineTest):
         example = self.json_of("example", "bar", "--out", self.folder / "json.obj")
         self.assertEqual((example["file"], example["material"]), (f"{self.folder}/json.obj", "maple"))
         self.assertIn("--impulse", example["strike"])
+        block = self.json_of("example", "bar", "--size", "0.14,0.07,0.01", "--out", self.folder / "block.obj")
+        corners = re.findall(r"(?m)^v (\S+) (\S+) (\S+)$", (self.folder / "block.obj").read_text())
+        numpy.testing.assert_allclose(numpy.max(numpy.array(corners, float), 0), (0.14, 0.07, 0.01))
+        self.assertIn("--point 0.07,0.035,0.01 ", block["strike"])
         exported = self.json_of("model", "export", "bar", "--out", self.folder / "json.npz")
         self.assertEqual(exported, {"file": f"{self.folder}/json.npz", "format": "npz", "modal_model": self.model})
         backup = self.folder / "json.db"
