@@ -178,6 +178,10 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
   fit.lines = LinesOf(bodies, match, *density);
   const std::vector<MeasuredDecay> decays = DecaysOf(fit.lines);
   fit.decay_count = decays.size();
+  if (!decays.empty()) {
+    const auto [lowest, highest] = std::ranges::minmax(decays, {}, &MeasuredDecay::frequency_hz);
+    fit.decays_from_hz = lowest.frequency_hz, fit.decays_to_hz = highest.frequency_hz;
+  }
   const auto heard = std::ranges::count_if(
       fit.lines, [](const FittedLine& line) { return line.mode && line.measured.decay_per_s > 0; });
   const bool known =

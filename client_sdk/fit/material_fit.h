@@ -58,7 +58,8 @@ struct MaterialFit {
   std::vector<DampingLaw> laws;
   std::vector<FittedLine> lines;
   size_t matched_count = 0;
-  size_t decay_count = 0;  ///< matched lines whose decay is known
+  size_t decay_count = 0;                       ///< matched lines whose decay is known
+  double decays_from_hz = 0, decays_to_hz = 0;  ///< the lowest and the highest of these
 };
 
 /// Fits one material to all bodies. Errors: InvalidArgument (TOO_FEW_MODES, MATCH_AMBIGUOUS,

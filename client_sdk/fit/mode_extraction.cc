@@ -39,8 +39,9 @@ constexpr double kHum_per_s = 0.03;
 /// Decays this near to the room's are hard to tell from it.
 constexpr double kNearRoom = 0.3;
 /// The least relative error of a decay in a room, and that of one as fast as the room's, which
-/// grows with the power 1.5 of the ratio of both: so they were in simulated rooms. Of a mode that
-/// dies much sooner than the room only the room is left where the window begins.
+/// grows with the ratio of both: so they were in simulated rooms, up to three times the room's
+/// rate. Of a mode that dies much sooner than the room only the room is left where the window
+/// begins.
 constexpr double kLeastErrorInRoom = 0.015, kErrorAtRoom = 0.15;
 
 /// A pole of one run, in Hz and 1/s.
@@ -396,7 +397,7 @@ void TellRoomApart(const std::vector<Band>& bands, const Progress& progress,
       mode.frequency_hz = bands[b].centre_hz() + refined.frequency_hz;
       mode.decay_per_s = refined.decay_per_s;
       const double ratio = refined.decay_per_s / extracted.room.decay_per_s;
-      const double least = std::max(kLeastErrorInRoom, kErrorAtRoom * std::pow(ratio, 1.5));
+      const double least = std::max(kLeastErrorInRoom, kErrorAtRoom * ratio);
       mode.decay_error_per_s = std::max(least * refined.decay_per_s, refined.decay_error_per_s);
       mode.near_room = std::abs(ratio - 1) < kNearRoom;
     }

@@ -140,8 +140,10 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
                           fit.decay_count);
   } else {
     absl::StrAppendFormat(&text,
-                          "# Damping: %s, within a factor of %.2f of half of the decay rates.\n",
-                          fit.laws[0].Name(), fit.laws[0].missed_by);
+                          "# Damping: %s, within a factor of %.2f of half of the decay rates, "
+                          "known from %.0f to %.0f Hz.\n",
+                          fit.laws[0].Name(), fit.laws[0].missed_by, fit.decays_from_hz,
+                          fit.decays_to_hz);
   }
   return absl::StrCat(text, MaterialOf(fit).DebugString());
 }
@@ -171,6 +173,28 @@ Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
   json["radiation_per_s"] = line.radiation_per_s;
   json["law_per_s"] = line.law_per_s;
   return json;
+}
+
+/// How well the material explains one of the bodies.
+struct Agreement {
+  size_t lines = 0, matched = 0;
+  double mean = 0, rms = 0;  ///< of the relative deviations of the lines from their modes
+};
+
+Agreement AgreementOf(const fit::MaterialFit& fit, size_t body) {
+  Agreement agreement;
+  for (const fit::FittedLine& line : fit.lines) {
+    if (line.body != body) continue;
+    ++agreement.lines;
+    if (!line.mode) continue;
+    const double deviation = std::log(line.measured.frequency_hz / line.model_hz);
+    ++agreement.matched;
+    agreement.mean += deviation, agreement.rms += deviation * deviation;
+  }
+  const auto matched = static_cast<double>(std::max<size_t>(1, agreement.matched));
+  agreement.mean /= matched;
+  agreement.rms = std::sqrt(agreement.rms / matched);
+  return agreement;
 }
 
 /// The frequencies of all modes of a body, with the material that was found.
@@ -206,6 +230,8 @@ Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
           {"rms", fit.rms},
           {"log_odds", fit.log_odds},
           {"decay_count", fit.decay_count},
+          {"decays_from_hz", fit.decays_from_hz},
+          {"decays_to_hz", fit.decays_to_hz},
           {"laws", laws},
           {"lines", lines},
           {"bodies", bodies},
@@ -260,6 +286,12 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
                fit.young_over_density, 200 * fit.young_over_density_error);
   absl::PrintF("E           %.5g GPa at %.5g kg/m^3\n", fit.young_pa / 1e9, fit.density_kg_per_m3);
   absl::PrintF("Poisson     %.4f +- %.4f\n", fit.poisson_ratio, 2 * fit.poisson_error);
+  for (size_t b = 0; sources.size() > 1 && b < sources.size(); ++b) {
+    const Agreement agreement = AgreementOf(fit, b);
+    absl::PrintF("%-11s %d of %s matched, %.2g %% apart, %+.2g %% on the average\n",
+                 sources[b].body.name, agreement.matched, Counted(agreement.lines, "line"),
+                 100 * agreement.rms, 100 * agreement.mean);
+  }
   if (fit.laws.empty()) {
     absl::PrintF(
         "damping     not found: the decays of only %d of %s are known, and the room or the noise "
@@ -278,6 +310,11 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
     }
     absl::PrintF("%-11s %s (%s, misses rates by x%.2f)\n", k == 0 ? "damping" : "  or",
                  absl::StripAsciiWhitespace(figures), law.Name(), law.missed_by);
+  }
+  if (!fit.laws.empty()) {
+    absl::PrintF(
+        "            by the decays of %s, known from %.0f to %.0f Hz; beyond, it is a guess\n",
+        Counted(fit.decay_count, "line"), fit.decays_from_hz, fit.decays_to_hz);
   }
   for (const Source& source : sources) {
     if (!source.extracted.rings.empty()) PrintRoom(source.extracted.room);
