@@ -294,9 +294,9 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
   }
   if (fit.laws.empty()) {
     absl::PrintF(
-        "damping     not found: the decays of only %d of %s are known, and the room or the noise "
-        "hides the others; record nearer and where there is less echo, or name the law "
-        "(--damping)\n",
+        "damping     not found: the decays of only %d of %s are known, and the others are hidden "
+        "by the room or the noise, or not in the table; record nearer and where there is less "
+        "echo, or name the law (--damping)\n",
         fit.decay_count, Counted(fit.matched_count, "matched line"));
   }
   for (size_t k = 0; k < fit.laws.size(); ++k) {

@@ -77,8 +77,9 @@ void AddFit(CLI::App& material, Program& program) {
       ->required();
   CLI::Option* recordings =
       fit.add_option("recordings", options->recordings, "WAV, AIFF, FLAC, Ogg or MP3 files");
-  fit.add_option("--modes", options->modes, "A CSV file of modes that were measured elsewhere")
-      ->excludes(recordings);
+  CLI::Option* modes =
+      fit.add_option("--modes", options->modes, "A CSV file of modes that were measured elsewhere")
+          ->excludes(recordings);
   fit.add_option(
       "--and", options->others,
       "A further body of the same material: its model and its recordings (may be repeated)");
@@ -89,6 +90,7 @@ void AddFit(CLI::App& material, Program& program) {
       });
   fit.add_option("--residual", options->residual,
                  "A WAV file for what the modes leave of the first strike")
+      ->excludes(modes)
       ->check([](const std::string& path) {
         return WhyNotWritten(path, {".wav", ".wave"});
       });
