@@ -50,6 +50,12 @@ class LikenessTest(unittest.TestCase):
         self.assertAlmostEqual(likeness.mrstft(sound, 0.1 * sound), 0)
         self.assertAlmostEqual(likeness.octave_error_db(sound, 3 * sound, RATE_HZ), 0)
 
+    def test_a_meter_shows_a_tone_of_one_pascal_at_94_db_and_hums_19_db_lower(self):
+        time = numpy.arange(2 * RATE_HZ) / RATE_HZ
+        for hz, db in ((1000, 94.0), (100, 94.0 - 19.1)):
+            tone = math.sqrt(2) * numpy.sin(2 * math.pi * hz * time)
+            self.assertAlmostEqual(likeness.fast_level_db(tone, RATE_HZ), db, delta=0.2)
+
     def test_the_distance_grows_with_what_is_wrong(self):
         right = ringing(BAR, noise=1e-4)
         dull = ringing([(hz, d, a if hz < 8000 else 0) for hz, d, a in BAR], noise=1e-4)

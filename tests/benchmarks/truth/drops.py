@@ -16,6 +16,10 @@ import rings
 HEIGHT_M, GRAVITY_M_PER_S2 = 0.3, 9.81
 BOUNCE_COUNT, RESTITUTION = 6, 0.5
 FIRST_S = 0.1  # the first contact begins before its middle, so not at the start of the rendering
+# The floor, of concrete, does not move: the body's corner meets it with the mass that it has there, a third of the
+# body's.
+FLOOR = {"striker_young_pa": 30e9, "striker_poisson_ratio": 0.2}
+PASCALS_SQUARED_TO_WATTS = 4 * math.pi / (1.204 * 343)  # of the mean over all directions, 1 m away
 SOFT_S = 5e-4  # the duration of every contact up to version 0.1, where nobody gave one
 
 
@@ -36,6 +40,24 @@ class Drop:
     name: str
     sound: object
     summary: dict
+    mass_kg: float
+
+    def pascals(self):
+        return float(self.summary["full_scale_pa"]) * self.sound
+
+    def first_j(self):
+        """The energy with which the corner meets the floor first."""
+        return self.mass_kg / 3 * GRAVITY_M_PER_S2 * HEIGHT_M
+
+    def radiated_j(self):
+        """What the first contact sends into the air until the second."""
+        second_s = FIRST_S + 2 * RESTITUTION * math.sqrt(2 * HEIGHT_M / GRAVITY_M_PER_S2)
+        first = self.pascals()[:int(second_s * rings.RATE_HZ)]
+        return PASCALS_SQUARED_TO_WATTS * float((first**2).sum()) / rings.RATE_HZ
+
+    def meter_db(self):
+        """What a sound level meter shows at most: dB(A), fast."""
+        return likeness.fast_level_db(self.pascals(), rings.RATE_HZ)
 
     def silent(self):
         """Below the smallest step of the file's 24 bits."""
@@ -93,7 +115,7 @@ def rayleigh(eta):
     return {"alpha1_s": eta / (2 * omega), "alpha2_per_s": eta * omega / 2}
 
 
-def blows(surface, mass_kg, duration_s):
+def blows(surface, mass_kg, duration_s=None):
     """The bounces: each meets the floor with another vertex, the same in each run, and a third of the mass."""
     vertices = [tuple(map(float, vertex)) for vertex in surface[0]]
     centre = [(min(side) + max(side)) / 2 for side in zip(*vertices)]
@@ -101,8 +123,9 @@ def blows(surface, mass_kg, duration_s):
     for point in random.Random(1).choices(vertices, k=BOUNCE_COUNT):
         impulse = mass_kg / 3 * speed * (1 + RESTITUTION)
         inwards = [c - x for x, c in zip(point, centre)]
+        collision = {**FLOOR, "reduced_mass_kg": mass_kg / 3, "approach_speed_m_per_s": speed}
         found.append(programs.Blow(point, tuple(impulse * x / math.hypot(*inwards) for x in inwards), duration_s,
-                                   time_s))
+                                   time_s, {} if duration_s else collision))
         speed *= RESTITUTION
         time_s += 2 * speed / GRAVITY_M_PER_S2
     return found
@@ -140,4 +163,4 @@ def hear(studio, model_file, body, before, modes_only=False):
                            modes_only=bool(modes_only and radiates))
     mass_kg = body.volume_m3 * material.density_kg_per_m3
     sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)
-    return Drop(body.name, sound, summary)
+    return Drop(body.name, sound, summary, mass_kg)

@@ -50,6 +50,17 @@ def octave_levels_db(samples, rate_hz):
     return 10 * numpy.log10(numpy.maximum(bands, 1e-30 * power.sum()) / power.sum())
 
 
+def fast_level_db(pressures_pa, rate_hz):
+    """The largest level that a sound level meter shows, dB(A) with the time constant of 125 ms (IEC 61672)."""
+    hz = numpy.fft.rfftfreq(len(pressures_pa), 1 / rate_hz)
+    weights = 1.2589 * (12194 * hz**2)**2 / ((hz**2 + 20.6**2) * (hz**2 + 12194**2)
+                                             * numpy.sqrt((hz**2 + 107.7**2) * (hz**2 + 737.9**2)))
+    weighted = numpy.fft.irfft(numpy.fft.rfft(pressures_pa) * weights, len(pressures_pa))
+    kept = numpy.exp(-1 / (0.125 * rate_hz))
+    power = signal.lfilter([1 - kept], [1, -kept], weighted**2)
+    return float(10 * numpy.log10(max(power.max(), 1e-30) / 20e-6**2))
+
+
 def octave_error_db(recording, sound, rate_hz):
     """Mean absolute difference of the octave levels, 1 to 16 kHz."""
     sound = at_level_of(recording, sound)

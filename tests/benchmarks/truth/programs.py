@@ -64,8 +64,9 @@ class Blow:
 
     point_m: tuple
     impulse_newton_seconds: tuple
-    duration_s: float = None  # None: the daemon's own choice
+    duration_s: float = None  # None: the daemon's own choice, from the figures of the collision
     time_s: float = 0.0
+    collision: dict = dataclasses.field(default_factory=dict)  # fields of HertzContact
 
     def message(self):
         import sound
@@ -74,6 +75,8 @@ class Blow:
         impulse.ClearField("duration_s")
         if self.duration_s is not None:
             impulse.duration_s = self.duration_s
+        for name, figure in self.collision.items():
+            setattr(impulse.hertz, name, figure)
         return impulse
 
 

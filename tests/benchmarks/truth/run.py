@@ -119,18 +119,19 @@ def show_bar(options):
 def drop_line(when, drop):
     summary = drop.summary
     if drop.silent():
-        return materials.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 2))
+        return materials.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 3))
     return materials.row(drop.name, when, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
-                         *(f"{db:.0f}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
+                         f"{drop.meter_db():.0f}",
+                         *(f"{round(float(db))}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
                          f"{summary['loudest_momentary_lufs']:.1f}" if "loudest_momentary_lufs" in summary else "-")
 
 
 def show_drops(options):
     print("## Five drops\n")
-    print("\n".join(materials.head("body", "laws", "peak, Pa", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
+    print("\n".join(materials.head("body", "laws", "peak, Pa", "dB(A), fast", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
                                "40 dB down after, s", "loudest 0.4 s, LUFS")))
     with studio(options.before) as (old, _), studio() as (new, folder):
-        pairs = []
+        pairs, energies = [], []
         for body in drops.BODIES:
             model_file = drops.decompose(folder, body)
             before = drops.hear(old, model_file, body, before=True)
@@ -140,9 +141,14 @@ def show_drops(options):
                       for laws, drop in (("before", before), ("modes only", modes), ("now", after))]
             print(drop_line("before", before), drop_line("modes only", modes), drop_line("now", after), sep="\n",
                   flush=True)
+            energies.append(materials.row(body.name, f"{1000 * after.mass_kg:.0f}", f"{after.first_j():.2g}",
+                                          f"{after.radiated_j():.2g}",
+                                          f"{100 * after.radiated_j() / after.first_j():.2g}"))
             print(f"{body.name}: acceleration noise over modes, dB: {drops.click_db(modes.sound, after.sound):+.1f}",
                   file=sys.stderr)
     print()
+    print_table([*materials.head("body", "mass, g", "energy of the corner at the first contact, J", "radiated, J",
+                                 "radiated, %"), *energies])
     pictures.draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
 
 
