@@ -149,6 +149,8 @@ void AddMass(Sparse& M, int column, int position, double mass) {
   for (int k = 0; k < 3; ++k) M.valuePtr()[M.outerIndexPtr()[3 * column + k] + position] += mass;
 }
 
+}  // namespace
+
 TetGeometry GeometryOf(const TetMesh& mesh, size_t element) {
   const std::span<const int32_t> nodes = ElementNodes(mesh, element);
   Eigen::Matrix<double, 3, 4> corners;
@@ -158,6 +160,8 @@ TetGeometry GeometryOf(const TetMesh& mesh, size_t element) {
   }
   return MakeTetGeometry(corners);
 }
+
+namespace {
 
 template <typename Stiffness, typename Mass>
 void AddElement(const NodeGraph& graph, std::span<const int32_t> nodes, const Stiffness& stiffness,

@@ -34,6 +34,9 @@ inline SystemMatrices Assemble(const TetMesh& mesh, const ElasticConstants& elas
   return Assemble(mesh, BodyMaterials(elastic, density_kg_per_m3), sharing);
 }
 
+/// Returns the geometry of an element, as if its edges were straight.
+TetGeometry GeometryOf(const TetMesh& mesh, size_t element);
+
 /// Returns the volume of the mesh, m^3.
 double VolumeM3(const TetMesh& mesh);
 

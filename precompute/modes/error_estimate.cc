@@ -10,15 +10,16 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/fem/assembly.h"
 #include "precompute/fem/curved_element.h"
 #include "precompute/fem/element.h"
 #include "precompute/mesh/curved_edges.h"
 #include "precompute/modes/added_functions.h"
 #include "precompute/modes/curved_integrals.h"
+#include "precompute/modes/mode_rows.h"
 #include "precompute/modes/patch_kernels.h"
 #include "precompute/modes/places.h"
 #include "precompute/modes/reentrant_edges.h"
-#include "precompute/sparse/block_kernels.h"
 #include "precompute/sparse/openblas.h"
 #include "precompute/sparse/workers.h"
 
@@ -37,8 +38,6 @@ constexpr double kMostError = 0.99;
 /// Power of a mode's error in its weight, see ErrorEstimate.
 constexpr double kWeightPower = 2;
 
-/// Number of modes in one pass over the places, which bounds the memory for their parts.
-constexpr Eigen::Index kModesAtATime = 4 * Eigen::Index{kBlockWidth};
 /// Number of places that a thread takes at a time. The sums of these are added in their order, so
 /// that they do not depend on the number of threads.
 constexpr size_t kPlacesAtATime = 4096;
@@ -127,14 +126,6 @@ Eigen::Matrix3d Stiffness(const ReferenceIntegrals::Mixed& integrals, const TetG
   return StiffnessBlock(outer, lame);
 }
 
-TetGeometry GeometryOf(const TetMesh& mesh, const int32_t* element) {
-  Eigen::Matrix<double, 3, 4> corners;
-  for (int i = 0; i < 4; ++i) {
-    corners.col(i) = Eigen::Vector3d::Map(mesh.nodes[static_cast<size_t>(element[i])].data());
-  }
-  return MakeTetGeometry(corners);
-}
-
 /// The nodes whose motions count for the residual at each place: those of the elements at the
 /// place.
 class Patches {
@@ -208,35 +199,32 @@ class Estimator {
     }
   }
 
-  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for some modes, and adds the weighted parts of each
-  /// edge and face to `shares`. `shapes` has a row for each unknown and a column for each mode.
-  Eigen::VectorXd Corrections(const Eigen::VectorXd& eigenvalues,
-                              const Eigen::Ref<const Eigen::MatrixXd>& shapes, Workers& workers,
-                              std::vector<double>& shares) const {
-    const Eigen::Index count = eigenvalues.size();
-    const Eigen::Index width = (count + kBlockWidth - 1) / kBlockWidth * kBlockWidth;
-    const std::vector<double> by_rows = Transposed(shapes, width);
-    Eigen::VectorXd padded = Eigen::VectorXd::Zero(width);
-    padded.head(count) = eigenvalues;
-    const ShapeRows rows{by_rows.data(), padded.data(), width};
+  /// Returns sum_b w_b r_b^T a(b, b)^-1 r_b for `count` modes, and adds the weighted parts of each
+  /// edge and face to `shares`.
+  Eigen::VectorXd Corrections(const Modes& modes, Eigen::Index first, Eigen::Index count,
+                              Workers& workers, std::vector<double>& shares) const {
+    const ModeRows some(modes, first, count);
+    const ShapeRows rows = some.rows();
+    const Eigen::Index width = rows.mode_count;
     const size_t group_count = (places_.count() + kPlacesAtATime - 1) / kPlacesAtATime;
     Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(width, static_cast<Eigen::Index>(group_count));
     std::vector<float> parts(places_.count() * static_cast<size_t>(width));
     workers.ForEach(static_cast<int64_t>(group_count), [&](int64_t group) {
-      const size_t first = static_cast<size_t>(group) * kPlacesAtATime;
-      const size_t end = std::min(first + kPlacesAtATime, places_.count());
-      for (size_t b = first; b < end; ++b) {
+      const size_t begin = static_cast<size_t>(group) * kPlacesAtATime;
+      const size_t end = std::min(begin + kPlacesAtATime, places_.count());
+      for (size_t b = begin; b < end; ++b) {
         AddPatchParts(patches_.Of(b), flexibility_[b], rows, sums.col(group).data(),
                       &parts[b * static_cast<size_t>(width)]);
       }
     });
-    const Eigen::VectorXd all = sums.rowwise().sum();
-    const Eigen::VectorXf weights = WeightsOf(eigenvalues, all.head(count)).cast<float>();
+    const Eigen::VectorXd all = sums.rowwise().sum().head(count);
+    const Eigen::VectorXf weights =
+        WeightsOf(modes.eigenvalues.segment(first, count), all).cast<float>();
     for (size_t b = 0; b < places_.count(); ++b) {
       const auto of_place = Eigen::VectorXf::Map(&parts[b * static_cast<size_t>(width)], count);
       shares[b] += static_cast<double>(of_place.dot(weights));
     }
-    return all.head(count);
+    return all;
   }
 
   /// Returns the shares of the edges and faces, distributed among their corners.
@@ -247,23 +235,6 @@ class Estimator {
   size_t place_count() const { return places_.count(); }
 
  private:
-  /// Returns the shapes by rows, with zeros up to `width`. They are transposed in parts that fit
-  /// into the cache.
-  static std::vector<double> Transposed(const Eigen::Ref<const Eigen::MatrixXd>& shapes,
-                                        Eigen::Index width) {
-    constexpr Eigen::Index kPart = 64;
-    std::vector<double> rows(static_cast<size_t>(shapes.rows() * width));
-    for (Eigen::Index first = 0; first < shapes.rows(); first += kPart) {
-      const Eigen::Index end = std::min(first + kPart, shapes.rows());
-      for (Eigen::Index m = 0; m < shapes.cols(); ++m) {
-        for (Eigen::Index r = first; r < end; ++r) {
-          rows[static_cast<size_t>(r * width + m)] = shapes(r, m);
-        }
-      }
-    }
-    return rows;
-  }
-
   /// Returns the weights of the modes in the local shares, see ErrorEstimate.
   static Eigen::VectorXd WeightsOf(const Eigen::VectorXd& eigenvalues,
                                    const Eigen::VectorXd& sums) {
@@ -290,7 +261,7 @@ class Estimator {
   }
 
   void AddStraight(size_t e, std::vector<Eigen::Matrix3d>& own) {
-    const TetGeometry geometry = GeometryOf(mesh_, Element(e));
+    const TetGeometry geometry = GeometryOf(mesh_, e);
     const LameConstants& lame = materials_.LameOf(mesh_, e);
     const double mass = materials_.DensityOf(mesh_, e) * geometry.volume_m3;
     for (size_t i = 0; i < places_.of_element(); ++i) {
@@ -326,12 +297,11 @@ ErrorEstimate EstimateFrequencyErrors(const TetMesh& mesh, const BodyMaterials& 
   Eigen::VectorXd errors(modes.eigenvalues.size());
   std::vector<double> shares(estimator.place_count());
   Workers workers(ThreadCount());
-  for (Eigen::Index first = 0; first < errors.size(); first += kModesAtATime) {
-    const Eigen::Index count = std::min(kModesAtATime, errors.size() - first);
-    const Eigen::VectorXd eigenvalues = modes.eigenvalues.segment(first, count);
-    const Eigen::VectorXd corrections =
-        estimator.Corrections(eigenvalues, modes.shapes.middleCols(first, count), workers, shares);
-    const Eigen::ArrayXd relative = constant * corrections.array() / eigenvalues.array();
+  for (Eigen::Index first = 0; first < errors.size(); first += ModeRows::kAtATime) {
+    const Eigen::Index count = std::min(ModeRows::kAtATime, errors.size() - first);
+    const Eigen::VectorXd corrections = estimator.Corrections(modes, first, count, workers, shares);
+    const Eigen::ArrayXd relative =
+        constant * corrections.array() / modes.eigenvalues.segment(first, count).array();
     // A frequency is proportional to the square root of its eigenvalue.
     errors.segment(first, count) = (1 - relative.min(kMostError)).sqrt().inverse() - 1;
   }

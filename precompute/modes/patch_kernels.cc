@@ -62,6 +62,25 @@ void PatchParts(const Patch& patch, const std::array<double, 9>& A, const ShapeR
   }
 }
 
+void SquaredDivergences(std::span<const int32_t> nodes, const double* gradients, double volume_m3,
+                        const ShapeRows& rows, double* sums) {
+  const D d;
+  const V volume = hn::Set(d, volume_m3);
+  for (int64_t mode = 0; mode < rows.mode_count; mode += LaneCount<double>()) {
+    V divergence[3] = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    for (size_t n = 0; n < nodes.size(); ++n) {
+      const double* const from = rows.shapes + 3 * int64_t{nodes[n]} * rows.mode_count + mode;
+      for (size_t x = 0; x < 3; ++x) {
+        const V u = hn::LoadU(d, from + static_cast<int64_t>(x) * rows.mode_count);
+        divergence[x] = hn::MulAdd(hn::Set(d, gradients[3 * n + x]), u, divergence[x]);
+      }
+    }
+    const V whole = hn::Add(divergence[0], hn::Add(divergence[1], divergence[2]));
+    const V sum = hn::LoadU(d, sums + mode);
+    hn::StoreU(hn::MulAdd(hn::Mul(volume, whole), whole, sum), d, sums + mode);
+  }
+}
+
 }  // namespace carillon::precompute::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -69,10 +88,16 @@ HWY_AFTER_NAMESPACE();
 namespace carillon::precompute {
 
 HWY_EXPORT(PatchParts);
+HWY_EXPORT(SquaredDivergences);
 
 void AddPatchParts(const Patch& patch, const std::array<double, 9>& A, const ShapeRows& rows,
                    double* sums, float* parts) {
   HWY_DYNAMIC_DISPATCH(PatchParts)(patch, A, rows, sums, parts);
+}
+
+void AddSquaredDivergences(std::span<const int32_t> nodes, const double* gradients,
+                           double volume_m3, const ShapeRows& rows, double* sums) {
+  HWY_DYNAMIC_DISPATCH(SquaredDivergences)(nodes, gradients, volume_m3, rows, sums);
 }
 
 }  // namespace carillon::precompute

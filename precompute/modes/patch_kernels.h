@@ -32,4 +32,9 @@ struct ShapeRows {
 void AddPatchParts(const Patch& patch, const std::array<double, 9>& A, const ShapeRows& rows,
                    double* sums, float* parts);
 
+/// Adds volume_m3 (div u)^2 of each mode to `sums`, where `gradients` has three numbers for each
+/// node of an element: the gradient of its function at a point.
+void AddSquaredDivergences(std::span<const int32_t> nodes, const double* gradients,
+                           double volume_m3, const ShapeRows& rows, double* sums);
+
 }  // namespace carillon::precompute
