@@ -128,7 +128,8 @@ def drop_line(when, drop):
 
 def show_drops(options):
     print("## Five drops\n")
-    print("\n".join(materials.head("body", "laws", "peak, Pa", "dB(A), fast", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
+    print("\n".join(materials.head("body", "laws", "peak, Pa", "dB(A), fast",
+                               *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
                                "40 dB down after, s", "loudest 0.4 s, LUFS")))
     with studio(options.before) as (old, _), studio() as (new, folder):
         pairs, energies = [], []
