@@ -11,7 +11,7 @@ declare class AudioWorkletProcessor { readonly port: MessagePort; }
 const TAPS = 32, PHASES = 512;
 const FIRST_TARGET = 512, LEAST_TARGET = 512, MORE = 256;
 /** What the machine kept from running once, it soon keeps from running again. */
-const CALM_S = 30;
+const CALM_S = 10;
 const MOST_RATIO_CHANGE = 0.004, GAIN = 2e-6, SMOOTHING = 0.02;
 /** Frames beyond the target that are left out at once: the ratio would take minutes. */
 const MOST_EXCESS = 4096;
@@ -118,13 +118,14 @@ class Player extends AudioWorkletProcessor {
     return true;
   }
 
-  /** Lowers the target after CALM_S whose least slack allows it. */
+  /** After CALM_S, lowers the target as far as a slack of MORE would have been left, in steps that no ear hears as pitch. */
   private relax(slack: number, frames: number): void {
     this.leastSlack = Math.min(this.leastSlack, slack);
     this.calm += frames;
     if (this.calm < CALM_S * sampleRate) return;
-    if (this.leastSlack > MORE && this.target > LEAST_TARGET) {
-      this.target -= MORE / 2;
+    const less = Math.min(this.leastSlack - MORE, this.target - LEAST_TARGET, 2 * MORE);
+    if (less > 0) {
+      this.target -= less;
       this.port.postMessage({ target: this.target });
     }
     this.calm = 0;
