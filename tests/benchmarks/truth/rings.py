@@ -63,22 +63,3 @@ def ring_near(sound, hz, smoothing_s=0.006, least_span_s=0.03):
     error = numpy.sqrt(covariance[0, 0] * smoothing_s * RATE_HZ)
     amplitude = 2 * numpy.exp(intercept - (slope * smoothing_s)**2 / 2)
     return Ring(float(hz), float(-slope), float(error), float(amplitude), float(time[-1] - time[0]))
-
-
-def peaks_hz(sound, floor_db=-45, apart_hz=60):
-    """Frequencies of the peaks of the spectrum, the falling half of Blackman's window over it, that stand
-    10 dB above the median of the 400 Hz around them."""
-    window = numpy.blackman(2 * len(sound))[len(sound):]
-    spectrum = 20 * numpy.log10(numpy.abs(numpy.fft.rfft(sound * window)) + 1e-30)
-    step_hz = RATE_HZ / len(sound)
-    around = int(200 / step_hz)
-    found, _ = signal.find_peaks(spectrum, height=spectrum.max() + floor_db, distance=max(1, int(apart_hz / step_hz)))
-    clear = [i for i in found
-             if spectrum[i] > numpy.median(spectrum[max(0, i - around):i + around + 1]) + 10]
-    return [float(i * step_hz) for i in clear]
-
-
-def rings(sound, **peaks):
-    """All rings of a recording that decay, ascending in frequency."""
-    found = [ring_near(sound, hz) for hz in peaks_hz(sound, **peaks)]
-    return sorted((r for r in found if r and r.decay_per_s > -1), key=lambda r: r.hz)

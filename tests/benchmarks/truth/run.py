@@ -67,12 +67,14 @@ def show_loudness(_):
     print()
 
 
-def fit_lines(young_pa, found):
-    yield (f"E {young_pa / 1e9:.1f} GPa, nu {found.poisson_ratio:.4f}; {len(found.pairs)} frequencies within "
-           f"{100 * found.error:.3f} % r.m.s.\n")
+def fit_lines(answer):
+    yield (f"E {answer['young_pa'] / 1e9:.2f} GPa, nu {answer['poisson_ratio']:.4f}; {answer['matched']} frequencies "
+           f"within {100 * answer['rms']:.3f} % r.m.s.\n")
     yield from materials.head("recorded, Hz", "fitted, Hz", "difference, %")
-    for ring, mode in found.pairs:
-        yield materials.row(f"{ring:.1f}", f"{mode:.1f}", f"{100 * (mode / ring - 1):+.3f}")
+    for line in answer["lines"]:
+        if "mode" in line:
+            ring, mode = line["frequency_hz"], line["model_hz"]
+            yield materials.row(f"{ring:.1f}", f"{mode:.1f}", f"{100 * (mode / ring - 1):+.3f}")
 
 
 def result_line(result, recorded):
@@ -102,13 +104,13 @@ def show_bar(options):
     recorded = {hz: ring.decay_per_s for hz, ring in found.items() if ring}
     print("## The recorded bar\n")
     with studio() as (opened, folder):
-        young_pa, fit = bar.fit_material(folder, rings.rings(whole))
-        print_table(fit_lines(young_pa, fit))
+        answer = bar.first_fit(opened, folder, path)
+        print_table(fit_lines(answer))
         print("\n".join(materials.head("", "MRSTFT", "octaves, dB", "decays, factor",
                                    *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ), "struck at, mm", "microphone")
                     + [materials.row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "", "")]))
         results = []
-        for variant in bar.variants(opened, folder, young_pa, fit.poisson_ratio):
+        for variant in bar.variants(opened, folder, path, recording, answer):
             results.append(bar.measure(opened, recording, variant))
             print(result_line(results[-1], recorded), flush=True)
         print()
