@@ -217,7 +217,7 @@ class Estimator {
                       &parts[b * static_cast<size_t>(width)]);
       }
     });
-    const Eigen::VectorXd all = sums.rowwise().sum().head(count);
+    Eigen::VectorXd all = sums.rowwise().sum().head(count);
     const Eigen::VectorXf weights =
         WeightsOf(modes.eigenvalues.segment(first, count), all).cast<float>();
     for (size_t b = 0; b < places_.count(); ++b) {
