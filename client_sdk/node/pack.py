@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Makes the package for Node of this folder: the modules, the adapters of engines, the contract, and the types of its
-messages.
+messages and of contacts.
 
 Usage: pack.py NODE_MODULES FOLDER
 
@@ -21,6 +21,9 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 GENERATOR = "@grpc/proto-loader/build/bin/proto-loader-gen-types.js"
+COMPILER = "typescript/bin/tsc"
+DECLARING = ("--allowJs", "--declaration", "--emitDeclarationOnly", "--skipLibCheck", "--target", "es2022", "--module",
+             "node16")
 # As lib/contract.js loads the files.
 LOADING = ("--longs=Number", "--enums=String", "--defaults", "--oneofs", "--includeComments")
 
@@ -53,11 +56,21 @@ def make_folder(modules, package):
         shutil.copy(file, package)
     shutil.copytree(ROOT / "proto/carillon", package / "proto/carillon")
     files = sorted(str(file.relative_to(ROOT / "proto")) for file in (ROOT / "proto/carillon/v1").glob("*.proto"))
-    done = subprocess.run(["node", modules / GENERATOR, *LOADING, f"--includeDirs={ROOT / 'proto'}",
-                           "--grpcLib=@grpc/grpc-js", f"--outDir={package / 'types'}", *files], check=False,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    generate(modules / GENERATOR, *LOADING, f"--includeDirs={ROOT / 'proto'}", "--grpcLib=@grpc/grpc-js",
+             f"--outDir={package / 'types'}", *files)
+    (package.parent / "node_modules").symlink_to(modules.resolve())  # where the compiler looks for what types need
+    # The compiler also writes the types of what contacts.js needs, which are nobody's.
+    generate(modules / COMPILER, package / "lib/contacts.js", *DECLARING, "--rootDir", package, "--outDir",
+             package / "declared")
+    (package / "declared/lib/contacts.d.ts").rename(package / "lib/contacts.d.ts")
+    shutil.rmtree(package / "declared")
+
+
+def generate(*words):
+    """Runs a program of node_modules that makes types."""
+    done = subprocess.run(["node", *words], check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode:
-        refuse(f"{modules / GENERATOR} could not make the types of the messages:\n{done.stdout}")
+        refuse(f"{words[0]} could not make the types of the package:\n{done.stdout}")
 
 
 def archive(package, path):

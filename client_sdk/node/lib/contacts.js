@@ -4,6 +4,71 @@
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown, tuple, whole } = require('./checks');
 const { CarillonError } = require('./errors');
 
+// The types of contacts, from which pack.py makes contacts.d.ts.
+/**
+ * @typedef {import('./index').ObjectLike} ObjectLike
+ * @typedef {import('./index').Striker} Striker
+ * @typedef {import('./index').Table} Table
+ * @typedef {import('./index').Vector} Vector
+ * @typedef {import('./index').Rotation} Rotation
+ * @typedef {import('../types/carillon/v1/Roughness').Roughness} Roughness
+ * @typedef {number | ArrayLike<number>} Numbers
+ * @typedef {ObjectLike | ArrayLike<ObjectLike>} Objects
+ */
+
+/**
+ * One strike: metres and newton seconds, in the object's own frame; without a duration, in seconds, the striker
+ * determines it.
+ * @typedef {{ point: Vector, impulse: Vector, duration?: number, striker?: Striker }} Strike
+ */
+
+/**
+ * The other body of a contact, if it is an object, too.
+ * @typedef {{ object: ObjectLike, point: Vector, rotation?: Rotation }} Second
+ */
+
+/**
+ * A blow that you intend, such as that of a hammer, `timeOffset` seconds after the step's time.
+ * @typedef {Strike & { object: ObjectLike, timeOffset?: number, second?: Second }} Impact
+ */
+
+/**
+ * One contact as an engine reports it: the impulse over the whole step, also at rest. `partner` is a whole number from 0
+ * to 4294967295 that names the other body.
+ * @typedef {Impact & { partner?: number, roughness?: Roughness }} Contact
+ */
+
+/**
+ * A contact force, newtons, of a simulator that separates resting contacts from impacts itself.
+ * @typedef {{ object: ObjectLike, point: Vector, force: Vector, roughness?: Roughness, second?: Second }} ContactForce
+ */
+
+/**
+ * What all contacts have as columns. One object, or one number, stands for all rows.
+ * @typedef {{ objects: Objects, points: Table, secondObjects?: Objects, secondPoints?: Table, secondRotations?: Table }}
+ *   ContactPlaces
+ */
+
+/**
+ * The roughness of contacts that slide or roll, as columns.
+ * @typedef {{ travelSpeeds?: Numbers, roughnessDepth?: number, irregularityLength?: number }} ContactRoughness
+ */
+
+/**
+ * Impacts as columns. A duration is in seconds, zero or more; NaN leaves one to the daemon.
+ * @typedef {ContactPlaces & { impulses: Table, durations?: Numbers, timeOffsets?: Numbers, striker?: Striker }} Impacts
+ */
+
+/**
+ * An engine's contacts as columns. Partners are whole numbers from 0 to 4294967295 that name the other bodies.
+ * @typedef {Impacts & ContactRoughness & { partners?: Numbers }} Contacts
+ */
+
+/**
+ * Contact forces as columns, newtons.
+ * @typedef {ContactPlaces & ContactRoughness & { forces: Table }} ContactForces
+ */
+
 // The largest magnitude of the time of a step, as contact.proto says.
 const LARGEST_TIME_S = 1e10;
 
@@ -271,7 +336,11 @@ function countRows({ contacts, contactColumns, poses }) {
   return lists.reduce((count, list) => count + (list?.length ?? 0), 0);
 }
 
-/** The rows of one strike. Throws a TypeError if it has not one point and one impulse, or if the impulse is zero. */
+/**
+ * The rows of one strike. Throws a TypeError if it has not one point and one impulse, or if the impulse is zero.
+ * @param {ObjectLike} object
+ * @param {*} [strike]
+ */
 function strikeOf(object, { point, impulse, duration, striker } = {}) {
   tuple(point, 3, 'point', "[x, y, z]: metres in the object's own frame");
   const meaning = "[x, y, z]: newton seconds in the object's own frame";

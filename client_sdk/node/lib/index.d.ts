@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/** The types of the package. Those of the contract's messages, below ../types, are generated when it is packed. */
+/**
+ * The types of the package. Those of the contract's messages, below ../types, and those of contacts are generated when it
+ * is packed, from the contract and from contacts.js.
+ */
 
+import type { Contact, ContactForce, ContactForces, Contacts, Impact, Impacts, Strike } from './contacts';
 import type { ContactFindings__Output } from '../types/carillon/v1/ContactFindings';
 import type { ContactStep } from '../types/carillon/v1/ContactStep';
 import type { ContactTraceHeader } from '../types/carillon/v1/ContactTraceHeader';
@@ -21,7 +25,6 @@ import type { RenderSettings } from '../types/carillon/v1/RenderSettings';
 import type { Remedy__Output } from '../types/carillon/v1/Remedy';
 import type { Blow__Output } from '../types/carillon/v1/Blow';
 import type { RenderSummary__Output } from '../types/carillon/v1/RenderSummary';
-import type { Roughness } from '../types/carillon/v1/Roughness';
 import type { Scene__Output } from '../types/carillon/v1/Scene';
 import type { SoundingObject__Output } from '../types/carillon/v1/SoundingObject';
 import type { StreamContactsResponse__Output } from '../types/carillon/v1/StreamContactsResponse';
@@ -48,79 +51,8 @@ export type ObjectLike = number | SoundingObject;
 /** A file, or metres and indices that count from zero. */
 export type Mesh = string | { vertices: Table; triangles: Table };
 
-/** One strike: metres and newton seconds, in the object's own frame; without a duration the striker determines it. */
-export interface Strike {
-  point: Vector;
-  impulse: Vector;
-  /** Seconds. */
-  duration?: number;
-  striker?: Striker;
-}
-
-/** The other body of a contact, if it is an object, too. */
-export interface Second { object: ObjectLike; point: Vector; rotation?: Rotation }
-
-/** A blow that you intend, such as that of a hammer. */
-export interface Impact extends Strike {
-  object: ObjectLike;
-  /** Seconds from the step's time. */
-  timeOffset?: number;
-  second?: Second;
-}
-
-/** One contact as an engine reports it: the impulse over the whole step, also at rest. */
-export interface Contact extends Impact {
-  /** A whole number from 0 to 4294967295 that names the other body. */
-  partner?: number;
-  roughness?: Roughness;
-}
-
-/** A contact force, of a simulator that separates resting contacts from impacts itself. */
-export interface ContactForce {
-  object: ObjectLike;
-  point: Vector;
-  /** Newtons. */
-  force: Vector;
-  roughness?: Roughness;
-  second?: Second;
-}
-
-/** What all contacts have as columns. One object, or one number, stands for all rows. */
-export interface ContactPlaces {
-  objects: ObjectLike | ArrayLike<ObjectLike>;
-  points: Table;
-  secondObjects?: ObjectLike | ArrayLike<ObjectLike>;
-  secondPoints?: Table;
-  secondRotations?: Table;
-}
-
-/** The roughness of contacts that slide or roll, as columns. */
-export interface ContactRoughness {
-  travelSpeeds?: number | ArrayLike<number>;
-  roughnessDepth?: number;
-  irregularityLength?: number;
-}
-
-/** Impacts as columns. */
-export interface Impacts extends ContactPlaces {
-  impulses: Table;
-  /** Seconds, zero or more; NaN leaves one to the daemon. */
-  durations?: number | ArrayLike<number>;
-  timeOffsets?: number | ArrayLike<number>;
-  striker?: Striker;
-}
-
-/** An engine's contacts as columns. */
-export interface Contacts extends Impacts, ContactRoughness {
-  /** Whole numbers from 0 to 4294967295 that name the other bodies. */
-  partners?: number | ArrayLike<number>;
-}
-
-/** Contact forces as columns. */
-export interface ContactForces extends ContactPlaces, ContactRoughness {
-  /** Newtons. */
-  forces: Table;
-}
+export type { Contact, ContactForce, ContactForces, ContactPlaces, ContactRoughness, Contacts, Impact, Impacts, Second,
+  Strike } from './contacts';
 
 /** Columns with the environment of each row of a performance, by default 0. */
 export type OfEnvironments<Columns> = Columns & { environments?: ArrayLike<number> };
