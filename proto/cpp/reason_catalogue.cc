@@ -99,7 +99,7 @@ absl::StatusOr<CatalogueReason> FindReason(const std::string& text) {
   std::vector<std::string> near = NearNames(name, names);
   if (near.empty()) near = NamesWithWordsOf(name, names);
   return Refusal(
-      absl::StatusCode::kInvalidArgument, "UNKNOWN_REASON",
+      absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
       absl::StrCat("there is no reason ", name, "; ",
                    near.empty() ? "`carillon explain` lists all"
                                 : absl::StrCat("did you mean ", absl::StrJoin(near, " or "), "?")));

@@ -22,7 +22,7 @@ struct CatalogueReason {
 const std::vector<CatalogueReason>& Reasons();
 
 /// Returns the reason that `text` names in small or capital letters, or with which a message such
-/// as "MESH_NOT_CLOSED: ..." begins. Errors: InvalidArgument (UNKNOWN_REASON; names the nearest).
+/// as "MESH_NOT_CLOSED: ..." begins. Errors: InvalidArgument (INVALID_SETTINGS; names the nearest).
 absl::StatusOr<CatalogueReason> FindReason(const std::string& text);
 
 }  // namespace carillon

@@ -21,14 +21,14 @@ namespace carillon {
 namespace {
 
 absl::Status Unusable(const std::filesystem::path& path, int error) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATA_DIRECTORY_UNUSABLE",
+  return Refusal(absl::StatusCode::kFailedPrecondition, "DATABASE_UNUSABLE",
                  absl::StrCat("\"", path.string(),
                               "\" cannot be used: ", std::generic_category().message(error),
                               "; choose another with --data-dir"));
 }
 
 absl::Status InUse(const std::filesystem::path& path) {
-  return Refusal(absl::StatusCode::kFailedPrecondition, "DATA_DIRECTORY_IN_USE",
+  return Refusal(absl::StatusCode::kUnavailable, "DATABASE_BUSY",
                  absl::StrCat("another daemon uses \"", path.string(),
                               "\"; stop it, or choose another folder with --data-dir"));
 }

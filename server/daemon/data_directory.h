@@ -19,11 +19,11 @@ class DataDirectory {
 
   /// Checks whether Open could use or create the folder, and whether this user may change the files
   /// of the database there, without locking or creating anything. Errors: FailedPrecondition
-  /// (DATA_DIRECTORY_UNUSABLE, DATABASE_UNUSABLE).
+  /// (DATABASE_UNUSABLE).
   static absl::Status Check(const std::filesystem::path& path);
 
   /// Locks the folder, for which it waits up to a second. Creates it, readable by its owner only,
-  /// unless it exists. Errors: FailedPrecondition (DATA_DIRECTORY_IN_USE, DATA_DIRECTORY_UNUSABLE).
+  /// unless it exists. Errors: Unavailable (DATABASE_BUSY), FailedPrecondition (DATABASE_UNUSABLE).
   static absl::StatusOr<DataDirectory> Open(const std::filesystem::path& path);
   ~DataDirectory();
   DataDirectory(DataDirectory&& other) noexcept;

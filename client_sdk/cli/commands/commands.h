@@ -181,7 +181,7 @@ absl::Status ShowJob(const client::Client& daemon, const std::string& text, bool
 absl::Status CancelJobs(const client::Client& daemon, const std::vector<std::string>& texts,
                         bool json);
 /// Explains an error reason or a warning, or lists all if `name` is empty. Errors: InvalidArgument
-/// (UNKNOWN_REASON).
+/// (INVALID_SETTINGS).
 absl::Status Explain(const std::string& name, bool json);
 absl::Status ListMaterials(const client::Client& daemon, bool json);
 absl::Status ShowMaterial(const client::Client& daemon, const std::string& name, bool json);

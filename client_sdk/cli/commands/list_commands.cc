@@ -118,7 +118,7 @@ absl::Status CancelJob(const client::Client& daemon, const std::string& text, bo
   }
   if (before.state() == v1::JOB_STATE_CANCELLED) end = "been cancelled";
   if (end.empty()) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kFailedPrecondition, "JOB_ENDED",
+  return Refusal(absl::StatusCode::kNotFound, "JOB_NOT_FOUND",
                  absl::StrCat(job.name(), " has already ", end, ", so there is nothing to cancel"));
 }
 

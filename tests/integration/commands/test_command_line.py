@@ -71,7 +71,7 @@ class ListsTest(CommandLineTest):
             self.run_command("model", "create", self.folder / f"{label}.obj", "--material", meshes.MATERIAL, "--nodes",
                              nodes, "--no-wait")
         ended = self.daemon.command("job", "cancel", "one", "bar", "two", check=False)
-        self.assertIn("JOB_ENDED", ended.stderr)
+        self.assertIn("JOB_NOT_FOUND", ended.stderr)
         for label in ("one", "two"):
             self.assertIn("JOB_CANCELLED", self.daemon.command("job", "watch", label, check=False).stderr)
 

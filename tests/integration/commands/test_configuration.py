@@ -43,8 +43,8 @@ class ConfigurationTest(unittest.TestCase):
                 ({"audio_device": f"file:{self.folder}"}, "OUTPUT_NOT_WRITABLE: cannot write"),
                 ({"head": "/nope.sofa"}, "HEAD_UNUSABLE"),
                 ({"precompute": "/nope"}, "WORKER_NOT_FOUND"),
-                ({"data_dir": "/proc/x"}, "DATA_DIRECTORY_UNUSABLE"),
-                ({"data_dir": f"{self.folder}/empty"}, "DATA_DIRECTORY_UNUSABLE"),
+                ({"data_dir": "/proc/x"}, "DATABASE_UNUSABLE"),
+                ({"data_dir": f"{self.folder}/empty"}, "DATABASE_UNUSABLE"),
                 ({"sample_rate": 1}, "INVALID_CONFIGURATION: sample_rate: "))
 
     def test_what_a_start_would_refuse_is_found_by_the_check_and_ends_with_status_2(self):

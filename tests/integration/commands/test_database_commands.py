@@ -115,7 +115,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         backup = self.folder / "backup.db"
         self.run_command("db", "backup", backup)
         self.run_command("model", "delete", "bar")
-        self.assertIn("DATA_DIRECTORY_IN_USE", self.offline("restore", backup).stderr)
+        self.assertIn("DATABASE_BUSY", self.offline("restore", backup).stderr)
         self.daemon.stop()
         self.assertEqual(self.offline("restore", backup).returncode, 0)
         self.assertTrue((self.folder / "data/carillon.db.replaced").exists())

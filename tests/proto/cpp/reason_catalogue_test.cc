@@ -43,7 +43,7 @@ TEST(ReasonCatalogue, IsFoundByNameInAnyLettersAndByAWholeMessage) {
 
 TEST(ReasonCatalogue, ANameThatIsNotThereHasItsNearest) {
   EXPECT_THAT(FindReason("MESH_NOT_CLOSD").status().ToString(),
-              HasSubstr("UNKNOWN_REASON: there is no reason MESH_NOT_CLOSD; did you mean "
+              HasSubstr("INVALID_SETTINGS: there is no reason MESH_NOT_CLOSD; did you mean "
                         "MESH_NOT_CLOSED?"));
   EXPECT_THAT(FindReason("closed_mesh").status().ToString(),
               HasSubstr("did you mean MESH_NOT_CLOSED?"));

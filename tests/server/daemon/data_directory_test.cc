@@ -31,8 +31,7 @@ TEST(DataDirectory, IsCheckedWithoutBeingMade) {
   WriteBytes(folder / "file", "");
   for (const std::filesystem::path& path :
        {folder / "file", folder / "file/a", std::filesystem::path("/proc/a/b")}) {
-    EXPECT_THAT(DataDirectory::Check(path).ToString(),
-                testing::HasSubstr("DATA_DIRECTORY_UNUSABLE: "))
+    EXPECT_THAT(DataDirectory::Check(path).ToString(), testing::HasSubstr("DATABASE_UNUSABLE: "))
         << path;
     EXPECT_FALSE(DataDirectory::Open(path).ok()) << path;
   }
@@ -43,8 +42,8 @@ TEST(DataDirectory, IsHeldByOneAtATime) {
   std::optional<absl::StatusOr<DataDirectory>> first = DataDirectory::Open(folder / "data");
   ASSERT_TRUE(first->ok());
   const absl::Status second = DataDirectory::Open(folder / "data").status();
-  EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(second.ToString(), testing::HasSubstr("DATA_DIRECTORY_IN_USE: "));
+  EXPECT_EQ(second.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(second.ToString(), testing::HasSubstr("DATABASE_BUSY: "));
   first.reset();
   EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
 }
