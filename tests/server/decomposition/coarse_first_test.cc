@@ -1,24 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Jobs that have a coarse model first.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <condition_variable>
-#include <mutex>
-
-#include "proto/cpp/mesh_format.h"
-#include "server/decomposition/decomposition_queue.h"
 #include "server/decomposition/job/coarse_request.h"
-#include "server/decomposition/job/decomposition_request.h"
-#include "server/decomposition/worker/local_executor.h"
-#include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
 namespace {
-
-constexpr std::chrono::seconds kDeadline(60);
 
 // Writes down which mesh is asked for, and computes: "coarse" for few nodes, else "fine".
 constexpr char kKind[] = R"(
@@ -26,54 +13,24 @@ kind=fine
 case $nodes in 300) kind=coarse;; esac
 echo $kind >>"$here/runs"
 )";
-constexpr char kSucceed[] = "cp \"$here/$kind\" \"$out\"\n";
+constexpr char kWriteKind[] = "cp \"$here/$kind\" \"$out\"\n";
 constexpr char kFineWaitsAtGate[] = "case $kind in fine) read line <\"$here/gate\";; esac\n";
 
-/// The newest state of a job, for waiting.
-class Observer {
- public:
-  void See(const v1::Job& job) {
-    const std::lock_guard lock(mutex_);
-    job_ = job;
-    changed_.notify_all();
-  }
-
-  template <typename Test>
-  v1::Job Await(Test test) {
-    std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(lock, kDeadline, [&] { return test(job_); }));
-    return job_;
-  }
-
-  v1::Job AwaitEnd() {
-    return Await([](const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; });
-  }
-
-  v1::Job AwaitFineRun() {
-    return Await([](const v1::Job& job) { return job.state() == v1::JOB_STATE_RUNNING; });
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  v1::Job job_;
-};
-
-class CoarseFirstTest : public ::testing::Test {
+class CoarseFirstTest : public DecompositionQueueTest {
  protected:
   CoarseFirstTest() {
-    Open();
-    request_ = SampleRequest(database_->meshes().Put("solid")->digest);
+    options_.worker_count = 2;
+    request_ = SampleRequest(mesh_);
     request_.set_coarse_first(true);
     request_.set_label("bowl");
     resolved_ = *ResolveRequest(request_);
     fine_ = RequestDigest(resolved_);
     coarse_ = RequestDigest(*CoarseRequest(resolved_, 5));
-    WriteModel("fine", 0);
-    WriteModel("coarse", 300);
+    WriteModelOf(0, "fine");
+    WriteModelOf(300, "coarse");
   }
 
-  void WriteModel(const std::string& name, uint32_t node_count) {
+  void WriteModelOf(uint32_t node_count, const std::string& name) {
     ModalModel model = SampleModel(3, 4);
     model.complete_to_eigenvalue = WantedEigenvalue(resolved_);
     std::vector<v1::ModalModelRecord> records = SampleRecords(model);
@@ -82,17 +39,8 @@ class CoarseFirstTest : public ::testing::Test {
     WriteRecords(folder_ / name, records);
   }
 
-  void Open() {
-    queue_.reset();
-    database_.reset();
-    database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
-  }
-
   void MakeQueue(const std::string& script) {
-    queue_.reset();
-    options_.program = WriteWorkerScript(folder_.path(), absl::StrCat(kKind, script));
-    options_.directory = folder_ / "running";
-    queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options_, clock_), clock_);
+    DecompositionQueueTest::MakeQueue(absl::StrCat(kKind, script));
   }
 
   void Submit() {
@@ -101,36 +49,23 @@ class CoarseFirstTest : public ::testing::Test {
     EXPECT_EQ(job->name(), absl::StrCat("jobs/", fine_));
   }
 
-  std::unique_ptr<JobWatch> Watch(const std::string& digest, Observer& observer) {
-    auto watch = queue_->Watch(digest, [&](const v1::Job& job) { observer.See(job); });
-    EXPECT_TRUE(watch.ok()) << watch.status();
-    return watch.ok() ? *std::move(watch) : nullptr;
-  }
-
   uint32_t NodesAskedForBy(const std::string& digest) {
     const auto summary = database_->models().Summary(digest);
     EXPECT_TRUE(summary.ok()) << summary.status();
     return summary.ok() ? summary->header.settings().mesh().target_node_count() : 1;
   }
 
-  std::string Runs() { return ReadBytes(folder_ / "runs"); }
-
-  TemporaryFolder folder_;
-  SystemClock clock_;
-  LocalExecutorOptions options_{.worker_count = 2};
   v1::CreateModalModelRequest request_, resolved_;
   std::string fine_, coarse_;
-  std::unique_ptr<ModeDatabase> database_;
-  std::unique_ptr<DecompositionQueue> queue_;
 };
 
 TEST_F(CoarseFirstTest, TheCoarseModelIsThereUnderTheNameUntilTheFineOneReplacesIt) {
   const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kFineWaitsAtGate, kSucceed));
+  MakeQueue(absl::StrCat(kFineWaitsAtGate, kWriteKind));
   Submit();
-  Observer observer;
+  Diary observer;
   const auto watch = Watch(fine_, observer);
-  EXPECT_TRUE(observer.AwaitFineRun().coarse_ready());
+  EXPECT_TRUE(observer.Await(v1::JOB_STATE_RUNNING).coarse_ready());
   EXPECT_EQ(NodesAskedForBy(fine_), 300U);
   EXPECT_EQ(database_->models().Summary(fine_)->label, "bowl");
   const auto sounding = database_->models().FindToSound(fine_);
@@ -147,35 +82,29 @@ TEST_F(CoarseFirstTest, TheCoarseModelIsThereUnderTheNameUntilTheFineOneReplaces
 }
 
 TEST_F(CoarseFirstTest, TheCoarseModelHasItsOwnNameAndIsNotComputedTwice) {
-  MakeQueue(kSucceed);
+  MakeQueue(kWriteKind);
   Submit();
-  Observer observer;
-  const auto watch = Watch(fine_, observer);
-  observer.AwaitEnd();
+  AwaitEnd(fine_);
   EXPECT_EQ(NodesAskedForBy(coarse_), 300U);
   EXPECT_EQ(queue_->Submit(*CoarseRequest(resolved_, 5))->state(), v1::JOB_STATE_SUCCEEDED);
   ASSERT_TRUE(queue_->DeleteModel(fine_).ok());
   Submit();
-  Observer again;
-  const auto watch_again = Watch(fine_, again);
-  EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(AwaitEnd(fine_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "coarse\nfine\nfine\n");
 }
 
 TEST_F(CoarseFirstTest, ADaemonKilledInBetweenGoesOnWithTheFineModel) {
   const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kFineWaitsAtGate, kSucceed));
+  MakeQueue(absl::StrCat(kFineWaitsAtGate, kWriteKind));
   Submit();
   {
-    Observer observer;
+    Diary observer;
     const auto watch = Watch(fine_, observer);
-    observer.AwaitFineRun();
+    observer.Await(v1::JOB_STATE_RUNNING);
   }
-  Open();
-  MakeQueue(kSucceed);
-  Observer observer;
-  const auto watch = Watch(fine_, observer);
-  EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  Open("carillon.db");
+  MakeQueue(kWriteKind);
+  EXPECT_EQ(AwaitEnd(fine_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(NodesAskedForBy(fine_), 0U);
   EXPECT_EQ(Runs().rfind("coarse"), 0U) << "the coarse model is computed once";
 }
@@ -185,28 +114,24 @@ TEST_F(CoarseFirstTest, ADaemonKilledBeforeTheCoarseModelIsThereComputesBothInOr
   MakeQueue("read line <\"$here/gate\"\n");
   Submit();
   {
-    Observer observer;
+    Diary observer;
     const auto watch = Watch(coarse_, observer);
-    observer.AwaitFineRun();
+    observer.Await(v1::JOB_STATE_RUNNING);
     EXPECT_EQ(queue_->Get(fine_)->state(), v1::JOB_STATE_QUEUED) << "though a worker is free";
   }
-  Open();
+  Open("carillon.db");
   std::filesystem::remove(folder_ / "runs");
-  MakeQueue(kSucceed);
-  Observer observer;
-  const auto watch = Watch(fine_, observer);
-  EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  MakeQueue(kWriteKind);
+  EXPECT_EQ(AwaitEnd(fine_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "coarse\nfine\n");
 }
 
 TEST_F(CoarseFirstTest, CancellingTheCoarseJobLetsTheFineOneStart) {
   const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat("case $kind in coarse) read line <\"$here/gate\";; esac\n", kSucceed));
+  MakeQueue(absl::StrCat("case $kind in coarse) read line <\"$here/gate\";; esac\n", kWriteKind));
   Submit();
   ASSERT_TRUE(queue_->Cancel(coarse_).ok());
-  Observer observer;
-  const auto watch = Watch(fine_, observer);
-  EXPECT_EQ(observer.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(AwaitEnd(fine_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_FALSE(database_->models().Summary(coarse_).ok());
 }
 

@@ -86,17 +86,6 @@ TEST_F(DecompositionQueueTest, ARefusalIsRememberedAcrossARestart) {
   EXPECT_EQ(RunCount(), 1U);
 }
 
-TEST_F(DecompositionQueueTest, ABodyWithoutModesInTheBandIsTriedAgainInAnotherBand) {
-  WriteBytes(folder_ / "events", ErrorBytes("NO_MODE_IN_BAND"));
-  MakeQueue(absl::StrCat(kCount, "case $band in *:20000) cp \"$here/model20\" \"$out\";; ",
-                         "*) cat \"$here/events\" >&3; exit 1;; esac"));
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(10'000)).error().reason(), "NO_MODE_IN_BAND");
-  EXPECT_EQ(Submit(Request(10'000)).state(), v1::JOB_STATE_FAILED);
-  EXPECT_EQ(RunCount(), 1U);
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(RunCount(), 2U);
-}
-
 TEST_F(DecompositionQueueTest, ABodyOfUnclearUnitIsTriedAgainWhereTheRequestStatesOne) {
   WriteBytes(folder_ / "events", ErrorBytes("MESH_UNIT_UNCLEAR"));
   MakeQueue(absl::StrCat(kCount, "grep -q 'metres_per_unit: 1$' \"$request\" || ",

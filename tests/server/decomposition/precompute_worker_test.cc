@@ -2,18 +2,9 @@
 //
 // The queue with carillon-precompute itself.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <future>
 #include <set>
 
-#include "server/base/sha256.h"
-#include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/job/decomposition_request.h"
-#include "server/decomposition/worker/local_executor.h"
-#include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
 namespace {
@@ -26,20 +17,11 @@ constexpr char kCube[] =
     "f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\n"
     "f 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
 
-class PrecomputeWorkerTest : public ::testing::Test {
+class PrecomputeWorkerTest : public DecompositionQueueTest {
  protected:
   PrecomputeWorkerTest() {
-    auto database = ModeDatabase::Open(folder_ / "carillon.db", clock_);
-    EXPECT_TRUE(database.ok()) << database.status();
-    database_ = *std::move(database);
-    LocalExecutorOptions options;
-    options.program = CARILLON_PRECOMPUTE;
-    options.directory = folder_ / "running";
-    auto executor = MakeLocalExecutor(options, clock_);
-    EXPECT_TRUE(executor.ok()) << executor.status();
-    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_);
-    EXPECT_TRUE(queue.ok()) << queue.status();
-    queue_ = *std::move(queue);
+    options_.program = CARILLON_PRECOMPUTE;
+    StartQueue();
   }
 
   v1::CreateModalModelRequest Request(const std::string& mesh, double max_frequency_hz) {
@@ -52,20 +34,14 @@ class PrecomputeWorkerTest : public ::testing::Test {
   }
 
   v1::Job Finish(const v1::CreateModalModelRequest& request) {
-    const auto job = queue_->Submit(request);
-    EXPECT_TRUE(job.ok()) << job.status();
-    std::promise<v1::Job> ended;
-    const auto watch = queue_->Watch(job->name().substr(5), [&](const v1::Job& now) {
+    Diary diary;
+    const auto watch = queue_->Watch(DigestOf(Submit(request)), [&](const v1::Job& now) {
       phases_.insert(now.progress().phase());
-      if (now.state() >= v1::JOB_STATE_SUCCEEDED) ended.set_value(now);
+      diary.Write(now);
     });
-    return ended.get_future().get();
+    return diary.AwaitEnd();
   }
 
-  TemporaryFolder folder_;
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
-  std::unique_ptr<DecompositionQueue> queue_;
   std::set<v1::Phase> phases_;
 };
 
@@ -102,16 +78,6 @@ TEST_F(PrecomputeWorkerTest, TellsTheFirstModeOfABodyThatIsTooHighAndTakesAHighe
   EXPECT_EQ(job.error().reason(), "NO_MODE_IN_BAND");
   EXPECT_GT(std::stod(job.error().metadata().at("first_mode_hz")), 5'000);
   EXPECT_EQ(Finish(Request(kCube, 40'000)).state(), v1::JOB_STATE_SUCCEEDED);
-}
-
-TEST_F(PrecomputeWorkerTest, GivesTheReasonOfABadMeshAndRemembersIt) {
-  const std::string open_cube = std::string(kCube).substr(0, std::string(kCube).find("f 4 1 5"));
-  const v1::Job job = Finish(Request(open_cube, 40'000));
-  EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
-  EXPECT_EQ(job.error().reason(), "MESH_NOT_CLOSED");
-  EXPECT_EQ(queue_->Submit(Request(open_cube, 40'000))->error().reason(), "MESH_NOT_CLOSED");
-  EXPECT_EQ(Finish(Request("no mesh at all", 40'000)).state(), v1::JOB_STATE_FAILED);
-  EXPECT_EQ(Finish(Request(kCube, 40'000)).state(), v1::JOB_STATE_SUCCEEDED) << "goes on";
 }
 
 }  // namespace

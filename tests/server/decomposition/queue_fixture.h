@@ -33,12 +33,23 @@ class Diary {
     written_.notify_all();
   }
 
+  template <typename Test>
+  v1::Job AwaitThat(Test test) {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(written_.wait_for(lock, kDeadline, [&] { return test(last_); }));
+    return last_;
+  }
+
   v1::Job Await(v1::JobState state) {
     return AwaitThat([state](const v1::Job& job) { return job.state() == state; });
   }
 
-  v1::Job AwaitEnd() {
-    return AwaitThat([](const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; });
+  v1::Job AwaitEnd() { return AwaitThat(HasEnded); }
+
+  /// Whether the job ends within a time.
+  bool EndsWithin(std::chrono::milliseconds time) {
+    std::unique_lock lock(mutex_);
+    return written_.wait_for(lock, time, [&] { return HasEnded(last_); });
   }
 
   std::vector<v1::JobState> states() {
@@ -47,12 +58,7 @@ class Diary {
   }
 
  private:
-  template <typename Test>
-  v1::Job AwaitThat(Test test) {
-    std::unique_lock lock(mutex_);
-    EXPECT_TRUE(written_.wait_for(lock, kDeadline, [&] { return test(last_); }));
-    return last_;
-  }
+  static bool HasEnded(const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; }
 
   std::mutex mutex_;
   std::condition_variable written_;
@@ -97,8 +103,14 @@ class DecompositionQueueTest : public ::testing::Test {
   }
 
   void MakeQueue(const std::string& script) {
-    queue_.reset();
+    queue_.reset();  // which may run the script
     options_.program = WriteWorkerScript(folder_.path(), script);
+    StartQueue();
+  }
+
+  /// Makes a queue whose worker is the program of the options.
+  void StartQueue() {
+    queue_.reset();
     options_.directory = folder_ / "running";
     auto executor = MakeLocalExecutor(options_, clock_);
     ASSERT_TRUE(executor.ok()) << executor.status();
@@ -120,22 +132,26 @@ class DecompositionQueueTest : public ::testing::Test {
     return job.ok() ? *job : v1::Job();
   }
 
-  std::unique_ptr<JobWatch> Watch(const v1::Job& job, Diary& diary) {
-    auto watch = queue_->Watch(DigestOf(job), [&diary](const v1::Job& now) { diary.Write(now); });
+  std::unique_ptr<JobWatch> Watch(const std::string& digest, Diary& diary) {
+    auto watch = queue_->Watch(digest, [&diary](const v1::Job& now) { diary.Write(now); });
     EXPECT_TRUE(watch.ok()) << watch.status();
     return watch.ok() ? *std::move(watch) : nullptr;
   }
+  std::unique_ptr<JobWatch> Watch(const v1::Job& job, Diary& diary) {
+    return Watch(DigestOf(job), diary);
+  }
 
-  v1::Job SubmitAndAwaitEnd(const v1::CreateModalModelRequest& request) {
+  v1::Job AwaitEnd(const std::string& digest) {
     Diary diary;
-    const auto watch = Watch(Submit(request), diary);
+    const auto watch = Watch(digest, diary);
     return diary.AwaitEnd();
   }
-
-  size_t RunCount() {
-    const std::string runs = ReadBytes(folder_ / "runs");
-    return static_cast<size_t>(std::ranges::count(runs, '\n'));
+  v1::Job SubmitAndAwaitEnd(const v1::CreateModalModelRequest& request) {
+    return AwaitEnd(DigestOf(Submit(request)));
   }
+
+  std::string Runs() { return ReadBytes(folder_ / "runs"); }
+  size_t RunCount() { return static_cast<size_t>(std::ranges::count(Runs(), '\n')); }
 
   TemporaryFolder folder_;
   SystemClock clock_;

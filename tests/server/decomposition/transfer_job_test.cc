@@ -1,24 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Jobs that compute the transfers of models.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
 #include <semaphore>
-#include <thread>
 #include <utility>
 
 #include "absl/strings/match.h"
 #include "proto/cpp/material_catalogue.h"
-#include "server/decomposition/decomposition_queue.h"
-#include "server/decomposition/job/decomposition_request.h"
 #include "server/decomposition/job/wanted_job.h"
-#include "server/decomposition/worker/local_executor.h"
-#include "tests/server/decomposition/scripted_worker.h"
+#include "tests/server/decomposition/queue_fixture.h"
 #include "tests/server/mode_database/faulty_vfs.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
@@ -28,8 +18,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr std::chrono::seconds kDeadline(60);
-
 // Writes down what is asked for.
 constexpr char kKind[] = R"(
 kind=model
@@ -38,46 +26,13 @@ cp "$mesh" "$here/input.$kind"
 cp "$request" "$here/request.$kind"
 echo $kind >>"$here/runs"
 )";
-constexpr char kSucceed[] = "cp \"$here/$kind\" \"$out\"\n";
+constexpr char kWriteKind[] = "cp \"$here/$kind\" \"$out\"\n";
 constexpr char kTransferWaits[] = "case $kind in transfer) read line <\"$here/gate\";; esac\n";
 
-/// Waits for the end of a job that is there.
-class Ending {
- public:
-  Ending(DecompositionQueue& queue, const std::string& digest) {
-    auto watch = queue.Watch(digest, [this](const v1::Job& news) {
-      const std::lock_guard lock(mutex_);
-      job_ = news;
-      changed_.notify_all();
-    });
-    EXPECT_TRUE(watch.ok()) << watch.status();
-    if (watch.ok()) watch_ = *std::move(watch);
-  }
-
-  v1::Job Await() {
-    std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(
-        lock, kDeadline, [this] { return !watch_ || job_.state() >= v1::JOB_STATE_SUCCEEDED; }));
-    return job_;
-  }
-
-  bool HasEnded() {
-    const std::lock_guard lock(mutex_);
-    return job_.state() >= v1::JOB_STATE_SUCCEEDED;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  v1::Job job_;
-  std::unique_ptr<JobWatch> watch_;
-};
-
-class TransferJobTest : public ::testing::Test {
+class TransferJobTest : public DecompositionQueueTest {
  protected:
   TransferJobTest() {
-    Open();
-    request_ = SampleRequest(database_->meshes().Put("solid")->digest);
+    request_ = SampleRequest(mesh_);
     request_.set_label("bowl");
     const v1::CreateModalModelRequest resolved = *ResolveRequest(request_);
     digest_ = RequestDigest(resolved);
@@ -91,18 +46,9 @@ class TransferJobTest : public ::testing::Test {
                                                                  .power_integrals = {1, 2, 3}}));
   }
 
-  void Open(const std::string& name = "carillon.db") {
-    queue_.reset();
-    database_.reset();
-    database_ = *ModeDatabase::Open(folder_ / name, clock_);
-  }
-
   void MakeQueue(const std::string& script, QueueSettings settings = {.transfers = true}) {
-    queue_.reset();
-    options_.program = WriteWorkerScript(folder_.path(), absl::StrCat(kKind, script));
-    options_.directory = folder_ / "running";
-    queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options_, clock_), clock_,
-                                       std::move(settings));
+    settings_ = std::move(settings);
+    DecompositionQueueTest::MakeQueue(absl::StrCat(kKind, script));
   }
 
   void Submit() {
@@ -110,22 +56,13 @@ class TransferJobTest : public ::testing::Test {
     ASSERT_TRUE(job.ok()) << job.status();
   }
 
-  v1::Job AwaitEnd(const std::string& digest) { return Ending(*queue_, digest).Await(); }
-
   size_t TransferCount() {
     const auto transfers = database_->transfers().List(digest_);
     return transfers.ok() ? transfers->size() : 0;
   }
 
-  std::string Runs() { return ReadBytes(folder_ / "runs"); }
-
-  TemporaryFolder folder_;
-  SystemClock clock_;
-  LocalExecutorOptions options_{.worker_count = 1};
   v1::CreateModalModelRequest request_;
   std::string digest_, transfer_;  // of the two jobs
-  std::unique_ptr<ModeDatabase> database_;
-  std::unique_ptr<DecompositionQueue> queue_;
 };
 
 // The disk becomes full at each of the writes that follow a run, and has space again once the queue
@@ -139,7 +76,7 @@ TEST_F(TransferJobTest, AFullDiskLosesNeitherTheEndOfAJobNorItsTransfer) {
     Open(absl::StrCat("full", good_count, ".db"));
     database_->meshes().Put("solid").status().IgnoreError();
     std::counting_semaphore<> waits(0);
-    MakeQueue(absl::StrCat("case $kind in model) read line <\"$here/gate\";; esac\n", kSucceed),
+    MakeQueue(absl::StrCat("case $kind in model) read line <\"$here/gate\";; esac\n", kWriteKind),
               {.transfers = true,
                .log = [&](const std::string&) { waits.release(); },
                .log_event =
@@ -148,13 +85,14 @@ TEST_F(TransferJobTest, AFullDiskLosesNeitherTheEndOfAJobNorItsTransfer) {
                        waits.release();
                    }});
     Submit();
-    Ending model(*queue_, digest_);
+    Diary model;
+    const auto watch = Watch(digest_, model);
     FaultyDisk::FailAfter(good_count, DiskFault::kFull);
     gate.Open();
-    while (!waits.try_acquire_for(std::chrono::milliseconds(10)) && !model.HasEnded()) {
+    while (!waits.try_acquire() && !model.EndsWithin(std::chrono::milliseconds(10))) {
     }
     failed_count += FaultyDisk::Repair() ? 1 : 0;
-    EXPECT_EQ(model.Await().state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(model.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
     EXPECT_EQ(database_->jobs().Find(digest_)->value().state, v1::JOB_STATE_SUCCEEDED);
     EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
     EXPECT_EQ(TransferCount(), 1U);
@@ -164,7 +102,7 @@ TEST_F(TransferJobTest, AFullDiskLosesNeitherTheEndOfAJobNorItsTransfer) {
 }
 
 TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
-  MakeQueue(kSucceed);
+  MakeQueue(kWriteKind);
   Submit();
   EXPECT_EQ(AwaitEnd(digest_).kind(), v1::JOB_KIND_DECOMPOSITION);
   const v1::Job job = AwaitEnd(transfer_);
@@ -180,10 +118,10 @@ TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
 }
 
 TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
-  MakeQueue(kSucceed, {});
+  MakeQueue(kWriteKind, {});
   Submit();
   AwaitEnd(digest_);
-  MakeQueue(kSucceed);
+  MakeQueue(kWriteKind);
   request_.set_without_transfer(true);
   Submit();
   EXPECT_FALSE(queue_->Get(transfer_).ok());
@@ -194,7 +132,7 @@ TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
 }
 
 TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
-  MakeQueue(kSucceed, {});
+  MakeQueue(kWriteKind, {});
   Submit();
   AwaitEnd(digest_);
   v1::CreateTransferRequest wanted;
@@ -215,7 +153,7 @@ TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
 }
 
 TEST_F(TransferJobTest, RefusesAModelThatIsNotStoredAndSettingsThatAreNone) {
-  MakeQueue(kSucceed);
+  MakeQueue(kWriteKind);
   v1::CreateTransferRequest wanted;
   wanted.mutable_material()->set_preset("chime_aluminum");
   EXPECT_THAT(queue_->SubmitTransfer(digest_, wanted).status().ToString(),
@@ -227,13 +165,13 @@ TEST_F(TransferJobTest, RefusesAModelThatIsNotStoredAndSettingsThatAreNone) {
 
 TEST_F(TransferJobTest, GoesOnAfterTheDaemonEndedDuringIt) {
   const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kTransferWaits, kSucceed));
+  MakeQueue(absl::StrCat(kTransferWaits, kWriteKind));
   Submit();
   AwaitEnd(digest_);
   queue_.reset();
   EXPECT_EQ(TransferCount(), 0U);
-  Open();
-  MakeQueue(kSucceed);
+  Open("carillon.db");
+  MakeQueue(kWriteKind);
   EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(TransferCount(), 1U);
 }
@@ -242,14 +180,14 @@ TEST_F(TransferJobTest, IsMadeForAModelThatWasStoredJustBeforeTheDaemonDied) {
   ASSERT_TRUE(database_->models().PutFile(digest_, "bowl", folder_ / "model").ok());
   const std::string request = ResolveRequest(request_)->SerializeAsString();
   ASSERT_TRUE(database_->jobs().Put({.digest = digest_, .request = request}).ok());
-  MakeQueue(kSucceed);
+  MakeQueue(kWriteKind);
   EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "transfer\n");
 }
 
 TEST_F(TransferJobTest, ATransferOfOtherModesIsAFailureAndNotStored) {
-  MakeQueue("case $kind in transfer) kind=other;; esac\n" + std::string(kSucceed));
+  MakeQueue("case $kind in transfer) kind=other;; esac\n" + std::string(kWriteKind));
   WriteBytes(folder_ / "other",
              SampleTransferBytes(SampleModel(2, 4), {.power_integrals = {1, 2}}));
   Submit();
