@@ -10,34 +10,16 @@ namespace {
 
 class AudioLevel : public ServedDaemon {
  protected:
-  /// The summary of a rendering of one object that is struck once along x.
-  v1::RenderSummary RenderStrike(double newton_seconds, double full_scale_pa = 0) {
-    grpc::ClientContext context;
-    const auto stream = audio->Render(&context);
-    v1::RenderRequest request;
-    request.mutable_settings()->set_tail_s(0.6);
-    if (full_scale_pa != 0) request.mutable_settings()->set_full_scale_pa(full_scale_pa);
-    stream->Write(request);
-    request.mutable_record()->mutable_header()->set_format_version(1);
-    stream->Write(request);
-    v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
-    object.set_handle(1);
-    object.set_modal_model(ImportSmallModel());
-    *object.mutable_material() = SmallMaterial();
-    stream->Write(request);
-    v1::Contact& impulse = *request.mutable_record()->mutable_step()->add_contacts() = Strike(1);
-    impulse.mutable_impulse_newton_seconds()->set_x(newton_seconds);
-    stream->Write(request);
-    stream->WritesDone();
-    v1::RenderResponse response;
-    while (stream->Read(&response)) {
-    }
-    status = stream->Finish();
-    EXPECT_EQ(status.ok(), full_scale_pa >= 0);
-    return response.summary();
+  /// The rendering of one object that is struck once along x.
+  Rendering RenderStrike(double newton_seconds, double full_scale_pa = 0) {
+    std::vector<v1::RenderRequest> requests = Trace();
+    requests[0].mutable_settings()->set_tail_s(0.6);
+    if (full_scale_pa != 0) requests[0].mutable_settings()->set_full_scale_pa(full_scale_pa);
+    v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
+    step.set_time_s(0);
+    step.mutable_contacts(0)->mutable_impulse_newton_seconds()->set_x(newton_seconds);
+    return Render(requests);
   }
-
-  grpc::Status status;
 
   v1::GetMixerResponse Mixer() {
     grpc::ClientContext context;
@@ -48,7 +30,7 @@ class AudioLevel : public ServedDaemon {
 };
 
 TEST_F(AudioLevel, ARenderingStatesPressureAndLoudness) {
-  const v1::RenderSummary once = RenderStrike(1);
+  const v1::RenderSummary once = RenderStrike(1).summary;
   EXPECT_GT(once.peak(), 0.0001);
   EXPECT_EQ(once.full_scale_pa(), 200);
   EXPECT_DOUBLE_EQ(once.peak_pa(), 200 * once.peak());
@@ -56,24 +38,22 @@ TEST_F(AudioLevel, ARenderingStatesPressureAndLoudness) {
   ASSERT_TRUE(once.has_integrated_lufs() && once.has_loudest_momentary_lufs());
   EXPECT_GE(once.loudest_momentary_lufs(), once.integrated_lufs() - 0.1);
   // Half of the impulse is 6.02 dB less.
-  const v1::RenderSummary half = RenderStrike(0.5);
+  const v1::RenderSummary half = RenderStrike(0.5).summary;
   EXPECT_NEAR(once.loudest_momentary_lufs() - half.loudest_momentary_lufs(), 6.02, 0.01);
 }
 
 TEST_F(AudioLevel, TheReferenceLevelScalesTheSoundAndLeavesThePressure) {
-  const v1::RenderSummary normal = RenderStrike(1);
-  const v1::RenderSummary louder = RenderStrike(1, 20);
+  const v1::RenderSummary normal = RenderStrike(1).summary;
+  const v1::RenderSummary louder = RenderStrike(1, 20).summary;
   EXPECT_EQ(louder.full_scale_pa(), 20);
   EXPECT_NEAR(louder.peak() / normal.peak(), 10, 1e-4);
   EXPECT_NEAR(louder.peak_pa() / normal.peak_pa(), 1, 1e-5);
   EXPECT_NEAR(louder.loudest_momentary_lufs() - normal.loudest_momentary_lufs(), 20, 0.01);
-  RenderStrike(0.1, -1);
-  EXPECT_NE(status.error_message().find("INVALID_SETTINGS: full_scale_pa is -1"),
-            std::string::npos);
+  ExpectRefused(RenderStrike(0.1, -1).status, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
 }
 
 TEST_F(AudioLevel, ARenderingOfNextToNothingHasNoLoudness) {
-  const v1::RenderSummary summary = RenderStrike(1e-9);
+  const v1::RenderSummary summary = RenderStrike(1e-9).summary;
   EXPECT_FALSE(summary.has_integrated_lufs() || summary.has_loudest_momentary_lufs());
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -23,19 +22,14 @@ struct DaemonRooms {
     settings.addresses = {address};
     settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
     settings.version = "test";
-    server = *ApiServer::Start(
-        settings, {.database = *database,
-                   .decompositions = *queue,
-                   .scenes = scenes,
-                   .output = *output,
-                   .clock = clock,
-                   .log = [this](const std::string& line) { Note(line); },
-                   .log_event = [this](const Event& event) { Note(event); },
-                   .check_decomposition =
-                       [this] {
-                         return can_decompose ? absl::OkStatus()
-                                              : absl::NotFoundError("WORKER_NOT_FOUND: none");
-                       }});
+    server = *ApiServer::Start(settings, {.database = *database,
+                                          .decompositions = *queue,
+                                          .scenes = scenes,
+                                          .output = *output,
+                                          .clock = clock,
+                                          .log = [this](const std::string& line) { Note(line); },
+                                          .log_event = [this](const Event& event) { Note(event); },
+                                          .check_decomposition = [] { return absl::OkStatus(); }});
   }
 
   std::unique_ptr<DecompositionQueue> MakeQueue() {
@@ -59,7 +53,6 @@ struct DaemonRooms {
   Mutex log_mutex;
   std::string log;                  ///< the warnings so far, a line each
   std::vector<std::string> events;  ///< the lines of the events so far
-  std::atomic<bool> can_decompose{true};
   TemporaryFolder folder;
   std::string address = "unix:" + (folder / "socket").string();
   SystemClock clock;

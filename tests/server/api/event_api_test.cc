@@ -39,39 +39,13 @@ class EventApi : public ServedDaemon {
                                [&](const std::string& line) { return line.rfind(name, 0) == 0; });
   }
 
-  /// Stores a mesh file, and returns its digest.
-  std::string Upload(const std::string& bytes) {
-    grpc::ClientContext context;
-    v1::UploadMeshResponse uploaded;
-    const auto writer = models->UploadMesh(&context, &uploaded);
-    v1::UploadMeshRequest mesh;
-    mesh.set_data(bytes);
-    writer->Write(mesh);
-    writer->WritesDone();
-    EXPECT_TRUE(writer->Finish().ok());
-    return uploaded.mesh_digest();
-  }
-
-  /// Requests a job that fails.
-  v1::Job Submit(const std::string& label) {
-    v1::CreateModalModelRequest request;
-    request.set_mesh_digest(Upload("the mesh of " + label));
-    request.set_mesh_format("obj");
-    request.mutable_material()->set_preset("chime_aluminum");
-    request.set_label(label);
-    v1::CreateModalModelResponse response;
-    EXPECT_TRUE(
-        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
-    return response.job();
-  }
-
   /// The end of each line of an event that a call of this process has caused.
   const std::string by_ = absl::StrCat(" caller=local peer=unix:pid-", getpid());
   std::unique_ptr<v1::AdminService::Stub> admin;
 };
 
 TEST_F(EventApi, AnUploadNamesTheMeshAndTheCaller) {
-  const std::string mesh = Upload("solid");
+  const std::string mesh = RequestFor("solid").mesh_digest();
   EXPECT_THAT(events(), ElementsAre(absl::StrCat("mesh_stored mesh=", mesh, " bytes=5", by_)));
 }
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
 #include <thread>
+#include <vector>
 
 #include "tests/server/api/served_daemon.h"
 
@@ -14,18 +13,6 @@ namespace {
 class LoadApi : public ServedDaemon {
  protected:
   explicit LoadApi(const ApiSettings& settings = {.client_share = 1}) : ServedDaemon(settings) {}
-
-  /// Begins to render a trace, whose objects come next.
-  std::unique_ptr<grpc::ClientReaderWriter<v1::RenderRequest, v1::RenderResponse>> BeginTrace(
-      grpc::ClientContext& context) {
-    auto stream = audio->Render(&context);
-    v1::RenderRequest request;
-    request.mutable_settings()->set_tail_s(0.2);
-    stream->Write(request);
-    request.mutable_record()->mutable_header()->set_format_version(1);
-    stream->Write(request);
-    return stream;
-  }
 };
 
 TEST_F(LoadApi, LargeStepsAreTakenWholeAndInOrder) {
@@ -67,15 +54,11 @@ class LittleMemoryApi : public LoadApi {
 TEST_F(LittleMemoryApi, ATraceOfAnyLengthIsRendered) {
   constexpr int kStepCount = 3000, kImpulseCount = 1000;
   grpc::ClientContext context;
-  const auto stream = BeginTrace(context);
-  const std::string model = ImportSmallModel();
+  std::vector<v1::RenderRequest> trace = Trace();
+  const auto stream = audio->Render(&context);
   std::jthread sender([&] {
+    for (size_t i = 0; i < 3; ++i) stream->Write(trace[i]);
     v1::RenderRequest request;
-    v1::ContactTraceObject& object = *request.mutable_record()->mutable_object();
-    object.set_handle(1);
-    object.set_modal_model(model);
-    *object.mutable_material() = SmallMaterial();
-    stream->Write(request);
     v1::ContactStep& step = *request.mutable_record()->mutable_step();
     v1::ContactColumns& columns = *step.add_contact_columns();
     columns.set_kind(v1::CONTACT_KIND_IMPACT);

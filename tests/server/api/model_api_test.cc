@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
-#include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -15,49 +14,12 @@ namespace {
 
 class ModelApi : public ServedDaemon {
  protected:
-  grpc::Status Upload(const std::vector<std::string>& pieces, v1::UploadMeshResponse& response) {
-    grpc::ClientContext context;
-    const auto writer = models->UploadMesh(&context, &response);
-    for (const std::string& piece : pieces) {
-      v1::UploadMeshRequest request;
-      request.set_data(piece);
-      writer->Write(request);
-    }
-    writer->WritesDone();
-    return writer->Finish();
-  }
-
-  v1::CreateModalModelRequest RequestFor(const std::string& mesh) {
-    v1::UploadMeshResponse uploaded;
-    EXPECT_TRUE(Upload({mesh}, uploaded).ok());
-    v1::CreateModalModelRequest request;
-    request.set_mesh_digest(uploaded.mesh_digest());
-    request.set_mesh_format("obj");
-    request.mutable_material()->set_preset("chime_aluminum");
-    return request;
-  }
-
   grpc::Status Create(const v1::CreateModalModelRequest& request, v1::Job& job) {
     grpc::ClientContext context;
     v1::CreateModalModelResponse response;
     grpc::Status status = models->CreateModalModel(&context, request, &response);
     job = response.job();
     return status;
-  }
-
-  grpc::Status Import(const std::vector<v1::ModalModelRecord>& records,
-                      const std::string& digest = std::string(64, 'b')) {
-    grpc::ClientContext context;
-    v1::ImportModalModelResponse response;
-    const auto writer = models->ImportModalModel(&context, &response);
-    v1::ImportModalModelRequest request;
-    request.set_name("modalModels/" + digest);
-    for (const v1::ModalModelRecord& record : records) {
-      *request.mutable_record() = record;
-      writer->Write(request);
-    }
-    writer->WritesDone();
-    return writer->Finish();
   }
 
   grpc::Status GetShapes(const std::string& name, const std::vector<uint32_t>& modes,
@@ -166,31 +128,6 @@ TEST_F(ModelApi, AJobThatIsNotThereIsNotFound) {
   }
 }
 
-TEST_F(ModelApi, WhatIsImportedIsExportedUnchangedAndListed) {
-  const std::string name = ImportSmallModel();
-  const std::vector<v1::ModalModelRecord> sent = SampleRecords(*SmallModel());
-  std::vector<v1::ModalModelRecord> received;
-  ASSERT_TRUE(Export(name, received).ok());
-  ASSERT_EQ(received.size(), sent.size());
-  for (size_t i = 0; i < sent.size(); ++i) {
-    EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(received[i], sent[i]));
-  }
-  grpc::ClientContext get_context;
-  v1::GetModalModelRequest get;
-  get.set_name(name);
-  v1::GetModalModelResponse got;
-  ASSERT_TRUE(models->GetModalModel(&get_context, get, &got).ok());
-  EXPECT_EQ(got.modal_model().label(), "small");
-  EXPECT_THAT(got.modal_model().eigenvalues(),
-              testing::ElementsAreArray(SmallModel()->eigenvalues));
-  grpc::ClientContext list_context;
-  v1::ListModalModelsResponse listed;
-  ASSERT_TRUE(models->ListModalModels(&list_context, {}, &listed).ok());
-  ASSERT_EQ(listed.modal_models_size(), 1);
-  EXPECT_EQ(listed.modal_models(0).name(), name);
-  EXPECT_EQ(listed.modal_models(0).eigenvalues_size(), 0);
-}
-
 TEST_F(ModelApi, AnExportWithoutShapesHasEveryOtherArrayUnchanged) {
   const std::string name = ImportSmallModel();
   std::vector<v1::ModalModelRecord> whole;
@@ -245,7 +182,8 @@ TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {
   std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
   records[0].mutable_header()->add_warnings(std::string(900'000, 'w'));
   for (const char digit : {'1', '2', '3', '4', '5', '6'}) {
-    ASSERT_TRUE(Import(records, std::string(64, digit)).ok());
+    v1::ImportModalModelResponse imported;
+    ASSERT_TRUE(Import(*models, "modalModels/" + std::string(64, digit), records, imported).ok());
   }
   v1::ListModalModelsRequest request;
   size_t count = 0;
@@ -257,37 +195,6 @@ TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   EXPECT_EQ(count, 6U);
-}
-
-TEST_F(ModelApi, MaterialsAreListed) {
-  grpc::ClientContext context;
-  v1::ListMaterialsResponse response;
-  ASSERT_TRUE(models->ListMaterials(&context, {}, &response).ok());
-  std::vector<std::string> names;
-  for (const v1::CatalogueMaterial& material : response.materials())
-    names.push_back(material.name());
-  EXPECT_THAT(names, testing::Contains("chime_aluminum"));
-}
-
-TEST_F(ModelApi, HealthSaysServing) {
-  grpc::GenericStub stub(channel());
-  grpc::ClientContext context;
-  grpc::CompletionQueue queue;
-  const grpc::Slice empty;  // an empty HealthCheckRequest: the server as a whole
-  const grpc::ByteBuffer request(&empty, 1);
-  grpc::ByteBuffer response;
-  grpc::Status status;
-  const auto call =
-      stub.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request, &queue);
-  call->StartCall();
-  call->Finish(&response, &status, nullptr);
-  void* tag = nullptr;
-  bool ok = false;
-  ASSERT_TRUE(queue.Next(&tag, &ok));
-  ASSERT_TRUE(status.ok()) << status.error_message();
-  grpc::Slice bytes;
-  ASSERT_TRUE(response.DumpToSingleSlice(&bytes).ok());
-  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), "\x08\x01");  // status = SERVING
 }
 
 }  // namespace

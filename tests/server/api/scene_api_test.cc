@@ -93,42 +93,6 @@ TEST_F(SceneApi, AnObjectWithoutAMaterialGetsTheOneOfItsModel) {
   ExpectRefused(Add(request, response), grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
 }
 
-TEST_F(SceneApi, ScenesAndTheirObjectsAreListed) {
-  const std::string empty = CreateScene();
-  const std::string full = CreateScene();
-  v1::AddObjectsResponse added;
-  for (const uint32_t handle : {7U, 3U}) {
-    v1::AddObjectsRequest request = SmallObject(full);
-    request.mutable_objects(0)->set_handle(handle);
-    ASSERT_TRUE(Add(request, added).ok());
-  }
-  grpc::ClientContext context;
-  v1::ListScenesResponse listed;
-  ASSERT_TRUE(scenes->ListScenes(&context, v1::ListScenesRequest(), &listed).ok());
-  ASSERT_EQ(listed.scenes_size(), 2);
-  EXPECT_EQ(listed.scenes(0).name(), empty);
-  EXPECT_EQ(listed.scenes(0).object_count(), 0U);
-  EXPECT_EQ(listed.scenes(1).name(), full);
-  EXPECT_EQ(listed.scenes(1).object_count(), 2U);
-  grpc::ClientContext of_objects;
-  v1::ListObjectsRequest request;
-  request.set_scene(full);
-  v1::ListObjectsResponse objects;
-  ASSERT_TRUE(scenes->ListObjects(&of_objects, request, &objects).ok());
-  ASSERT_EQ(objects.objects_size(), 2);
-  EXPECT_EQ(objects.objects(0).handle(), 3U);
-  EXPECT_EQ(objects.objects(1).SerializeAsString(), [&] {
-    v1::SoundingObject expected = added.objects(0);
-    expected.set_handle(7);
-    expected.set_name(full + "/objects/7");
-    return expected.SerializeAsString();
-  }());
-  grpc::ClientContext of_none;
-  request.set_scene("scenes/77");
-  ExpectRefused(scenes->ListObjects(&of_none, request, &objects), grpc::NOT_FOUND,
-                "SCENE_NOT_FOUND");
-}
-
 TEST_F(SceneApi, ContactsAreCountedAndTheLastRejectionSaysWhy) {
   const std::string scene = CreateScene();
   v1::AddObjectsResponse added;

@@ -232,15 +232,5 @@ TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
   EXPECT_TRUE(AddAll(Objects({1, 2})).ok());
 }
 
-TEST_F(AddObjectsApi, TheDaemonIsFilledAndNotOverfilled) {
-  const std::vector<uint32_t> half(SceneRegistry::kMaxObjectCount / 2, 0);
-  ASSERT_TRUE(AddAll(Objects(half)).ok());
-  std::vector<uint32_t> more(half.size() + 1, 0);
-  const grpc::Status status = AddAll(Objects(more));
-  ExpectRefused(status, grpc::RESOURCE_EXHAUSTED, "TOO_MANY_OBJECTS");
-  EXPECT_EQ(ErrorOf(status).metadata().at("index"), std::to_string(half.size()));
-  ASSERT_TRUE(AddAll(Objects(half)).ok());
-}
-
 }  // namespace
 }  // namespace carillon

@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -52,25 +53,68 @@ class ServedDaemon : public testing::Test {
     return (stub.*method)(&context, request, &response);
   }
 
-  /// Stores SmallModel and returns its name.
-  std::string ImportSmallModel() { return ImportModel(*SmallModel()); }
-
-  /// Stores a model under its digest, if it has one, and returns its name.
-  std::string ImportModel(const ModalModel& model) {
-    // Under a sanitizer this takes longer than a client may be silent.
-    const auto records = SampleRecords(model);
+  /// Stores a mesh file that comes in pieces.
+  grpc::Status Upload(const std::vector<std::string>& pieces, v1::UploadMeshResponse& response) {
     grpc::ClientContext context;
-    v1::ImportModalModelResponse response;
-    const auto writer = models->ImportModalModel(&context, &response);
+    const auto writer = models->UploadMesh(&context, &response);
+    for (const std::string& piece : pieces) {
+      v1::UploadMeshRequest request;
+      request.set_data(piece);
+      writer->Write(request);
+    }
+    writer->WritesDone();
+    return writer->Finish();
+  }
+
+  /// The request for the model of a mesh, which is stored first. The job fails, since no mesh of
+  /// these tests is one.
+  v1::CreateModalModelRequest RequestFor(const std::string& mesh, const std::string& label = "") {
+    v1::UploadMeshResponse uploaded;
+    EXPECT_TRUE(Upload({mesh}, uploaded).ok());
+    v1::CreateModalModelRequest request;
+    request.set_mesh_digest(uploaded.mesh_digest());
+    request.set_mesh_format("obj");
+    request.mutable_material()->set_preset("chime_aluminum");
+    request.set_label(label);
+    return request;
+  }
+
+  v1::Job Submit(const v1::CreateModalModelRequest& request) {
+    v1::CreateModalModelResponse response;
+    EXPECT_TRUE(
+        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
+    return response.job();
+  }
+  v1::Job Submit(const std::string& label) {
+    return Submit(RequestFor("the mesh of " + label, label));
+  }
+
+  /// Imports a model under a name, or under one that the daemon gives, with the label "small".
+  static grpc::Status Import(v1::ModalModelService::Stub& stub, const std::string& name,
+                             const std::vector<v1::ModalModelRecord>& records,
+                             v1::ImportModalModelResponse& response) {
+    grpc::ClientContext context;
+    const auto writer = stub.ImportModalModel(&context, &response);
     v1::ImportModalModelRequest request;
-    if (!model.digest.empty()) request.set_name("modalModels/" + model.digest);
+    request.set_name(name);
     request.set_label("small");
     for (const v1::ModalModelRecord& record : records) {
       *request.mutable_record() = record;
       writer->Write(request);
     }
     writer->WritesDone();
-    const grpc::Status status = writer->Finish();
+    return writer->Finish();
+  }
+
+  /// Stores SmallModel and returns its name.
+  std::string ImportSmallModel() { return ImportModel(*SmallModel()); }
+
+  /// Stores a model under its digest, if it has one, and returns its name.
+  std::string ImportModel(const ModalModel& model) {
+    v1::ImportModalModelResponse response;
+    const grpc::Status status =
+        Import(*models, model.digest.empty() ? "" : "modalModels/" + model.digest,
+               SampleRecords(model), response);
     EXPECT_TRUE(status.ok()) << status.error_message();
     return response.modal_model().name();
   }
@@ -141,6 +185,55 @@ class ServedDaemon : public testing::Test {
     return answer;
   }
 
+  /// The requests of an offline rendering: the settings, a header, one object that is struck, and
+  /// the step with the strike at 0.5 s.
+  std::vector<v1::RenderRequest> Trace() {
+    std::vector<v1::RenderRequest> requests(4);
+    requests[0].mutable_settings()->set_tail_s(0.2);
+    requests[1].mutable_record()->mutable_header()->set_format_version(1);
+    v1::ContactTraceObject& object = *requests[2].mutable_record()->mutable_object();
+    object.set_handle(1);
+    object.set_modal_model(ImportSmallModel());
+    *object.mutable_material() = SmallMaterial();
+    v1::ContactStep& step = *requests[3].mutable_record()->mutable_step();
+    step.set_time_s(0.5);
+    *step.add_contacts() = Strike(1);
+    return requests;
+  }
+
+  struct Rendering {
+    grpc::Status status;
+    v1::AudioFormat format;
+    std::vector<float> sound;
+    v1::RenderSummary summary;
+  };
+
+  Rendering Render(const std::vector<v1::RenderRequest>& requests) {
+    Rendering rendering;
+    grpc::ClientContext context;
+    const auto stream = audio->Render(&context);
+    for (const v1::RenderRequest& request : requests) stream->Write(request);
+    stream->WritesDone();
+    v1::RenderResponse response;
+    while (stream->Read(&response)) {
+      if (response.has_format()) rendering.format = response.format();
+      if (response.has_summary()) rendering.summary = response.summary();
+      if (response.has_block()) {
+        EXPECT_EQ(response.block().first_frame(),
+                  rendering.sound.size() / rendering.format.channel_count());
+        AppendSamples(response.block(), rendering.sound);
+      }
+    }
+    rendering.status = stream->Finish();
+    return rendering;
+  }
+
+  static void AppendSamples(const v1::AudioBlock& block, std::vector<float>& sound) {
+    const size_t old_size = sound.size();
+    sound.resize(old_size + block.samples().size() / sizeof(float));
+    std::ranges::copy(block.samples(), reinterpret_cast<char*>(sound.data() + old_size));
+  }
+
   std::unique_ptr<v1::ModalModelService::Stub> models;
   std::unique_ptr<v1::DecompositionService::Stub> jobs;
   std::unique_ptr<v1::SceneService::Stub> scenes;
@@ -163,8 +256,6 @@ class ServedDaemon : public testing::Test {
     const MutexLock lock(&rooms_.log_mutex);
     return rooms_.events;
   }
-  /// Sets whether the program that computes decompositions is there.
-  void SetCanDecompose(bool can) { rooms_.can_decompose = can; }
 
  private:
   DaemonRooms rooms_;

@@ -83,18 +83,5 @@ TEST_F(ClusterInfoApi, SlurmIsAFeature) {
   EXPECT_TRUE(std::ranges::is_sorted(answer.features()));
 }
 
-/// A daemon on TCP that nobody may use without a token.
-class GuardedInfoApi : public ServedDaemon {
- protected:
-  GuardedInfoApi() : ServedDaemon({.access_file = AccessFile()}, {"127.0.0.1:0"}) {}
-
-  static std::string AccessFile() {
-    std::string path = testing::TempDir() + "/carillon_server_info_access";
-    std::ofstream(path) << "# nobody\n";
-    std::filesystem::permissions(path, std::filesystem::perms::owner_read);
-    return path;
-  }
-};
-
 }  // namespace
 }  // namespace carillon

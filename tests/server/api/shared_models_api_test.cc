@@ -21,41 +21,14 @@ class SharedModelsApi : public ServedDaemon {
 
   static grpc::Status Import(v1::ModalModelService::Stub& stub, const std::string& name,
                              const std::vector<v1::ModalModelRecord>& records) {
-    grpc::ClientContext context;
     v1::ImportModalModelResponse response;
-    const auto writer = stub.ImportModalModel(&context, &response);
-    v1::ImportModalModelRequest request;
-    request.set_name(name);
-    for (const v1::ModalModelRecord& record : records) {
-      *request.mutable_record() = record;
-      writer->Write(request);
-    }
-    writer->WritesDone();
-    return writer->Finish();
+    return ServedDaemon::Import(stub, name, records, response);
   }
 
   static std::vector<v1::ModalModelRecord> OtherRecords() {
     ModalModel other = *SmallModel();
     for (double& eigenvalue : other.eigenvalues) eigenvalue *= 2;
     return SampleRecords(other);
-  }
-
-  /// A request for a model, whose mesh is stored.
-  v1::CreateModalModelRequest RequestWithMesh() {
-    grpc::ClientContext context;
-    v1::UploadMeshResponse uploaded;
-    const auto upload = models->UploadMesh(&context, &uploaded);
-    v1::UploadMeshRequest mesh;
-    mesh.set_data("mesh");
-    upload->Write(mesh);
-    upload->WritesDone();
-    EXPECT_TRUE(upload->Finish().ok());
-    v1::CreateModalModelRequest request;
-    request.set_mesh_digest(uploaded.mesh_digest());
-    request.set_mesh_format("obj");
-    request.mutable_settings()->set_poisson_ratio(SmallModel()->poisson_ratio);
-    *request.mutable_material() = SmallMaterial();
-    return request;
   }
 
   v1::ModalModelSummary Get(const std::string& name) {
@@ -99,7 +72,9 @@ TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
 }
 
 TEST_F(SharedModelsApi, ARequestDoesNotChangeAPinnedModelOfOthers) {
-  v1::CreateModalModelRequest request = RequestWithMesh();
+  v1::CreateModalModelRequest request = RequestFor("mesh");
+  request.mutable_settings()->set_poisson_ratio(SmallModel()->poisson_ratio);
+  *request.mutable_material() = SmallMaterial();
   const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
   ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
   v1::UpdateModalModelRequest pin;

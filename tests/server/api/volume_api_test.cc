@@ -71,23 +71,17 @@ class VolumeApi : public ServedDaemon {
   }
 
   /// The samples of an offline rendering of the records.
-  std::vector<float> Render(const std::vector<v1::ContactTraceRecord>& records, double gain) {
-    grpc::ClientContext context;
-    const auto stream = audio->Render(&context);
-    v1::RenderRequest request;
-    request.mutable_settings()->set_gain(gain);
-    request.mutable_settings()->set_tail_s(0.5);
-    stream->Write(request);
+  std::vector<float> RenderRecords(const std::vector<v1::ContactTraceRecord>& records,
+                                   double gain) {
+    std::vector<v1::RenderRequest> requests(1);
+    requests[0].mutable_settings()->set_gain(gain);
+    requests[0].mutable_settings()->set_tail_s(0.5);
     for (const v1::ContactTraceRecord& record : records) {
-      *request.mutable_record() = record;
-      stream->Write(request);
+      *requests.emplace_back().mutable_record() = record;
     }
-    stream->WritesDone();
-    std::vector<float> samples;
-    v1::RenderResponse response;
-    while (stream->Read(&response)) Append(response.block().samples(), samples);
-    EXPECT_TRUE(stream->Finish().ok());
-    return samples;
+    Rendering rendering = Render(requests);
+    EXPECT_TRUE(rendering.status.ok());
+    return rendering.sound;
   }
 
   /// Expects that the stream that `act` sends to a scene renders to the samples that are heard, and
@@ -103,12 +97,12 @@ class VolumeApi : public ServedDaemon {
     std::vector<v1::ContactTraceRecord> records = Recorded(scene, act);
     EXPECT_EQ(records.size(), 3U);
     const uint64_t first_frame = records[0].header().clock().first_frame();
-    std::vector<float> rendered = Render(records, 1);
+    std::vector<float> rendered = RenderRecords(records, 1);
     rendered.resize(rendered.size() - 480);  // which fade out
     std::vector<float> live;
     while (live.size() < rendered.size() && heard->Read(&block)) {
       EXPECT_EQ(block.lost_frame_count(), 0U);
-      if (block.block().first_frame() >= first_frame) Append(block.block().samples(), live);
+      if (block.block().first_frame() >= first_frame) AppendSamples(block.block(), live);
     }
     listening.TryCancel();
     live.resize(rendered.size());
@@ -116,29 +110,7 @@ class VolumeApi : public ServedDaemon {
     EXPECT_EQ(live, rendered);
     return records;
   }
-
-  static void Append(const std::string& bytes, std::vector<float>& samples) {
-    const size_t before = samples.size();
-    samples.resize(before + bytes.size() / sizeof(float));
-    if (!bytes.empty()) std::memcpy(samples.data() + before, bytes.data(), bytes.size());
-  }
 };
-
-TEST_F(VolumeApi, ASceneTellsItsVolume) {
-  const std::string scene = CreateScene();
-  v1::UpdateSceneRequest change;
-  change.set_gain(0.25);
-  change.set_muted(true);
-  v1::Scene changed = Update(change, scene);
-  EXPECT_EQ(changed.gain(), 0.25);
-  EXPECT_TRUE(changed.muted());
-  EXPECT_FALSE(changed.solo());
-  change.Clear();
-  change.set_solo(true);
-  changed = Update(change, scene);
-  EXPECT_EQ(changed.gain(), 0.25);
-  EXPECT_TRUE(changed.muted() && changed.solo());
-}
 
 TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSamples) {
   const std::string other = SceneWithObject(), scene = SceneWithObject();
@@ -152,8 +124,8 @@ TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSampl
   EXPECT_EQ(records[0].header().gain(), 0.5);
 
   // A gain of the rendering is that much more.
-  const std::vector<float> rendered = Render(records, 1);
-  const std::vector<float> half = Render(records, 0.5);
+  const std::vector<float> rendered = RenderRecords(records, 1);
+  const std::vector<float> half = RenderRecords(records, 0.5);
   ASSERT_EQ(half.size(), rendered.size());
   for (size_t n = 0; n < half.size(); ++n) ASSERT_FLOAT_EQ(half[n], 0.5F * rendered[n]);
 }

@@ -20,34 +20,6 @@ class WatchJobsApi : public ServedDaemon {
  protected:
   using Reader = std::unique_ptr<grpc::ClientReader<v1::WatchJobsResponse>>;
 
-  /// Stores a mesh of which every job fails, and returns its digest.
-  std::string Upload(const std::string& text) {
-    grpc::ClientContext context;
-    v1::UploadMeshResponse uploaded;
-    const auto writer = models->UploadMesh(&context, &uploaded);
-    v1::UploadMeshRequest mesh;
-    mesh.set_data(text);
-    writer->Write(mesh);
-    writer->WritesDone();
-    EXPECT_TRUE(writer->Finish().ok());
-    return uploaded.mesh_digest();
-  }
-
-  /// Creates a job that fails, and returns its name.
-  std::string Submit(const std::string& label) { return Submit(label, Upload("mesh of " + label)); }
-  std::string Submit(const std::string& label, const std::string& mesh, uint32_t mode_count = 0) {
-    v1::CreateModalModelRequest request;
-    request.set_mesh_digest(mesh);
-    request.set_mesh_format("obj");
-    request.mutable_material()->set_preset("chime_aluminum");
-    request.set_label(label);
-    if (mode_count > 0) request.mutable_settings()->set_keep_mode_count(mode_count);
-    v1::CreateModalModelResponse response;
-    EXPECT_TRUE(
-        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
-    return response.job().name();
-  }
-
   void Cancel(const std::string& name) {
     v1::CancelJobRequest request;
     request.set_name(name);
@@ -82,8 +54,8 @@ class WatchJobsApi : public ServedDaemon {
 TEST_F(WatchJobsApi, TellsOfEachJobFromItsBeginToItsEnd) {
   Reader reader = jobs->WatchJobs(&context_, {});
   EXPECT_THAT(ReadBegin(reader), ElementsAre());
-  const std::string first = Submit("first");
-  const std::string second = Submit("second");
+  const std::string first = Submit("first").name();
+  const std::string second = Submit("second").name();
   const std::vector<v1::Job> read = ReadToEndOf(second, reader);
   for (const std::string& name : {first, second}) {
     int last = v1::JOB_STATE_UNSPECIFIED;
@@ -108,7 +80,7 @@ TEST_F(WatchJobsApi, SendsOnlyWhatMatches) {
   ReadBegin(reader);
   Submit("bowl");
   Submit("BELL one");
-  const std::vector<v1::Job> read = ReadToEndOf(Submit("two bells"), reader);
+  const std::vector<v1::Job> read = ReadToEndOf(Submit("two bells").name(), reader);
   std::vector<std::string> labels;
   for (const v1::Job& job : read) {
     EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
@@ -127,9 +99,12 @@ TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   const auto stub = v1::DecompositionService::NewStub(
       grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), arguments));
-  const std::string mesh = Upload("a mesh");
+  v1::CreateModalModelRequest request = RequestFor("a mesh", std::string(200, 'x'));
   Reader reader = stub->WatchJobs(&context_, {});
-  for (uint32_t i = 0; i < kSubmitted; ++i) Cancel(Submit(std::string(200, 'x'), mesh, 1 + i));
+  for (uint32_t i = 0; i < kSubmitted; ++i) {
+    request.mutable_settings()->set_keep_mode_count(1 + i);
+    Cancel(Submit(request).name());
+  }
   uint32_t read_count = 0;
   v1::WatchJobsResponse response;
   while (read_count < kSubmitted && reader->Read(&response)) ++read_count;
@@ -140,7 +115,7 @@ TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   grpc::ClientContext context;
   Reader another = jobs->WatchJobs(&context, {});
   ReadBegin(another);
-  const std::string name = Submit("last");
+  const std::string name = Submit("last").name();
   EXPECT_EQ(ReadToEndOf(name, another).back().name(), name);
 }
 
