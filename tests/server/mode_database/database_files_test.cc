@@ -11,6 +11,7 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -111,8 +112,13 @@ TEST_F(DatabaseFilesTest, ACollectionDeletesMoreThanOneTransactionDoes) {
     ASSERT_TRUE(Put(std::to_string(i)).ok());
     ASSERT_TRUE(database_->meshes().Put("solid " + std::to_string(i)).ok());
   }
-  EXPECT_EQ(database_->models().Collect(0, {.dry_run = true})->model_count, 41U);
-  EXPECT_EQ(database_->models().Collect(0)->model_count, 41U);
+  std::set<std::string> told;
+  const auto note = [&](const std::string& digest, uint64_t) { told.insert(digest); };
+  EXPECT_EQ(database_->models().Collect(0, {.dry_run = true, .on_deleted = note})->model_count,
+            41U);
+  EXPECT_EQ(told.size(), 0U);
+  EXPECT_EQ(database_->models().Collect(0, {.on_deleted = note})->model_count, 41U);
+  EXPECT_EQ(told.size(), 41U);
   EXPECT_EQ(database_->models().Collect(0)->model_count, 0U);
   constexpr std::chrono::milliseconds kAnyAge(-1000);
   EXPECT_EQ(database_->meshes().Collect(kAnyAge, true)->mesh_count, 40U);

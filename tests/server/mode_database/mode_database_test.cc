@@ -1,18 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/mode_database.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cstring>
-#include <set>
-#include <string>
-#include <thread>
 #include <vector>
 
 #include "carillon/v1/modal_model_service.pb.h"
-#include "server/base/sha256.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 
 namespace carillon {
 namespace {
@@ -20,23 +12,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class ModeDatabaseTest : public ::testing::Test {
+class ModeDatabaseTest : public DatabaseTest {
  protected:
-  ModeDatabaseTest() { Reopen(); }
-
-  void Reopen() {
-    database_.reset();
-    auto opened = ModeDatabase::Open(file_, clock_);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    database_ = *std::move(opened);
-  }
-
-  absl::Status Put(const std::string& digest, const ModalModel& model,
-                   const std::string& label = "") {
-    WriteRecords(folder_ / "model", SampleRecords(model));
-    return database_->models().PutFile(digest, label, folder_ / "model").status();
-  }
-
   static std::string Export(ModeDatabase& database, const std::string& digest) {
     auto records = database.models().Export(digest);
     EXPECT_TRUE(records.ok()) << records.status();
@@ -48,29 +25,11 @@ class ModeDatabaseTest : public ::testing::Test {
       bytes += Delimited(**record);
     }
   }
-
-  // Flips one bit of the database file, in the first place that holds `bytes`.
-  void FlipABitWithin(std::string_view bytes) {
-    database_.reset();  // all of the log goes into the file
-    std::string content = ReadBytes(file_);
-    const size_t at = content.find(bytes);
-    ASSERT_NE(at, std::string::npos);
-    content[at] ^= 1;
-    WriteBytes(file_, content);
-    Reopen();
-  }
-
-  TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "carillon.db";
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
-  const std::string a_ = Sha256Hex("a");
-  const std::string b_ = Sha256Hex("b");
 };
 
 TEST_F(ModeDatabaseTest, AStoredModelIsFoundAfterReopening) {
   const ModalModel model = SampleModel(100, 1000);
-  ASSERT_TRUE(Put(a_, model, "bell").ok());
+  ASSERT_TRUE(PutModel(a_, model, "bell").ok());
   Reopen();
   const auto found = database_->models().Find(a_);
   ASSERT_TRUE(found.ok()) << found.status();
@@ -85,7 +44,7 @@ TEST_F(ModeDatabaseTest, AStoredModelIsFoundAfterReopening) {
 }
 
 TEST_F(ModeDatabaseTest, WhatWasAcknowledgedIsInACopyTakenWithoutClosing) {
-  ASSERT_TRUE(Put(a_, SampleModel(100, 1000)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(100, 1000)).ok());
   const auto mesh = database_->meshes().Put("solid");
   ASSERT_TRUE(mesh.ok());
   ASSERT_TRUE(database_->jobs().Put({.digest = b_, .request = "intent"}).ok());
@@ -103,7 +62,7 @@ TEST_F(ModeDatabaseTest, WhatWasAcknowledgedIsInACopyTakenWithoutClosing) {
 }
 
 TEST_F(ModeDatabaseTest, ExportAndImportGiveIdenticalBytes) {
-  ASSERT_TRUE(Put(a_, SampleModel(100, 1000)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(100, 1000)).ok());
   const std::string bytes = Export(*database_, a_);
   EXPECT_EQ(bytes, ReadBytes(folder_ / "model"));
 
@@ -130,7 +89,7 @@ TEST_F(ModeDatabaseTest, AnImportThatEndsEarlyLeavesNothing) {
 }
 
 TEST_F(ModeDatabaseTest, ARefusedFileLeavesTheOldRevision) {
-  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(2, 4)).ok());
   auto records = SampleRecords(SampleModel(3, 4));
   (*records.back().mutable_chunk()->mutable_data())[0] ^= 1;
   WriteRecords(folder_ / "bad", records);
@@ -141,27 +100,21 @@ TEST_F(ModeDatabaseTest, ARefusedFileLeavesTheOldRevision) {
   EXPECT_EQ((*found)->mode_count(), 2U);
 }
 
-TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsRead) {
+TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExportedOrRead) {
   ModalModel model = SampleModel(3, 4);
   model.couplings = {1.234567890123, 2.345678901234, 3.456789012345};
-  ASSERT_TRUE(Put(a_, model).ok());
-  FlipABitWithin({reinterpret_cast<const char*>(model.couplings.data()), 24});
-  const auto found = database_->models().Find(a_);
-  EXPECT_EQ(found.status().code(), absl::StatusCode::kDataLoss);
-  EXPECT_THAT(found.status().ToString(), HasSubstr("MODAL_MODEL_CORRUPT"));
-  EXPECT_EQ(database_->models().Summary(a_).status().code(), absl::StatusCode::kDataLoss);
-}
-
-TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExported) {
-  ModalModel model = SampleModel(3, 4);
-  model.couplings = {1.234567890123, 2.345678901234, 3.456789012345};
-  ASSERT_TRUE(Put(a_, model).ok());
+  ASSERT_TRUE(PutModel(a_, model).ok());
   FlipABitWithin({reinterpret_cast<const char*>(model.couplings.data()), 24});
   auto records = database_->models().Export(a_);
   ASSERT_TRUE(records.ok()) << records.status();
   absl::Status status;
   for (int i = 0; status.ok() && i < 10; ++i) status = records->Next().status();
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+  Reopen();  // without the quarantine of the export
+  const auto found = database_->models().Find(a_);
+  EXPECT_EQ(found.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(found.status().ToString(), HasSubstr("MODAL_MODEL_CORRUPT"));
+  EXPECT_EQ(database_->models().Summary(a_).status().code(), absl::StatusCode::kDataLoss);
 }
 
 TEST_F(ModeDatabaseTest, AFlippedBitInAMeshIsFoundWhenItIsWrittenOut) {
@@ -184,25 +137,25 @@ TEST_F(ModeDatabaseTest, ANewerSchemaIsRefused) {
 }
 
 TEST_F(ModeDatabaseTest, AReplacedModelIsReadAnewAndKeepsItsLabel) {
-  ASSERT_TRUE(Put(a_, SampleModel(2, 4), "first").ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(2, 4), "first").ok());
   const auto old = database_->models().Find(a_);
-  ASSERT_TRUE(Put(a_, SampleModel(3, 4), "second").ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(3, 4), "second").ok());
   EXPECT_EQ(database_->models().Find(a_).value()->mode_count(), 3U);
   EXPECT_EQ((*old)->mode_count(), 2U);
   EXPECT_EQ(database_->models().Summary(a_)->label, "first");
 }
 
 TEST_F(ModeDatabaseTest, AnExportOfAReplacedModelSaysSo) {
-  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(2, 4)).ok());
   auto records = database_->models().Export(a_);
   ASSERT_TRUE(records.ok());
   ASSERT_TRUE(records->Next().ok());
-  ASSERT_TRUE(Put(a_, SampleModel(3, 4)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(3, 4)).ok());
   EXPECT_THAT(records->Next().status().ToString(), HasSubstr("MODAL_MODEL_REPLACED"));
 }
 
 TEST_F(ModeDatabaseTest, DeletingAModelDeletesItsJob) {
-  ASSERT_TRUE(Put(a_, SampleModel(2, 4)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(2, 4)).ok());
   ASSERT_TRUE(database_->jobs().Put({.digest = a_}).ok());
   ASSERT_TRUE(database_->models().Delete(a_).ok());
   EXPECT_THAT(database_->models().Find(a_).status().ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
@@ -210,29 +163,9 @@ TEST_F(ModeDatabaseTest, DeletingAModelDeletesItsJob) {
   EXPECT_THAT(database_->models().Delete(a_).ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
 }
 
-TEST_F(ModeDatabaseTest, PagesListEveryModelOnceNewestFirst) {
-  std::vector<std::string> newest_first;
-  for (int i = 0; i < 5; ++i) {
-    newest_first.insert(newest_first.begin(), Sha256Hex(std::to_string(i)));
-    ASSERT_TRUE(Put(newest_first.front(), SampleModel(1, 4)).ok());
-  }
-  std::vector<std::string> listed;
-  std::string token;
-  do {
-    const auto page = database_->models().List({}, 2, token);
-    ASSERT_TRUE(page.ok()) << page.status();
-    EXPECT_LE(page->models.size(), 2U);
-    for (const ModelSummary& model : page->models) listed.push_back(model.digest);
-    token = page->next_page_token;
-  } while (!token.empty());
-  EXPECT_EQ(listed, newest_first);
-  EXPECT_THAT(database_->models().List({}, 2, "x").status().ToString(),
-              HasSubstr("INVALID_SETTINGS"));
-}
-
 TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
-  ASSERT_TRUE(Put(a_, SampleModel(2, 4), "Church Bell").ok());
-  ASSERT_TRUE(Put(b_, SampleModel(50, 400), "glass").ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(2, 4), "Church Bell").ok());
+  ASSERT_TRUE(PutModel(b_, SampleModel(50, 400), "glass").ok());
   ASSERT_TRUE(database_->models().Update(b_, {.add_tags = {"fragile", "set:2"}}).ok());
   const auto listed = [&](const ModelFilter& filter) {
     std::string labels;
@@ -251,6 +184,8 @@ TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
   EXPECT_EQ(listed({.created_since_unix_ms = clock_.UnixMs() + 60'000}), "");
   ASSERT_TRUE(database_->models().Update(b_, {.remove_tags = {"fragile", "none"}}).ok());
   EXPECT_EQ(listed({.tag = "fragile"}), "");
+  EXPECT_THAT(database_->models().List({}, 2, "x").status().ToString(),
+              HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(database_->models().Update(b_, {.add_tags = {"two words"}}).status().ToString(),
               HasSubstr("INVALID_SETTINGS"));
   EXPECT_THAT(database_->models().Update(Sha256Hex("c"), {}).status().ToString(),
@@ -261,7 +196,7 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   const std::string c = Sha256Hex("c");
   const std::string d = Sha256Hex("d");
   for (const std::string& digest : {a_, b_, c, d}) {
-    ASSERT_TRUE(Put(digest, SampleModel(10, 100)).ok());
+    ASSERT_TRUE(PutModel(digest, SampleModel(10, 100)).ok());
   }
   const uint64_t size = database_->models().Summary(a_)->stored_bytes;
   ASSERT_TRUE(database_->models().Update(a_, {.pinned = true}).ok());
@@ -283,9 +218,9 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
 
 TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   database_->models().KeepWithin({.bytes = 1});
-  ASSERT_TRUE(Put(a_, SampleModel(10, 100)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(10, 100)).ok());
   EXPECT_TRUE(database_->models().Find(a_).ok()) << "though it alone is beyond the budget";
-  ASSERT_TRUE(Put(a_, SampleModel(20, 100)).ok());
+  ASSERT_TRUE(PutModel(a_, SampleModel(20, 100)).ok());
   EXPECT_TRUE(database_->models().Find(a_).ok()) << "its next revision, too";
   auto import = database_->models().Import(b_, "");
   ASSERT_TRUE(import.ok());
@@ -295,19 +230,6 @@ TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   ASSERT_TRUE(import->Finish().ok());
   EXPECT_TRUE(absl::IsNotFound(database_->models().Find(a_).status()));
   EXPECT_TRUE(database_->models().Find(b_).ok());
-}
-
-TEST_F(ModeDatabaseTest, EveryModelOfACollectionInManyTransactionsIsTold) {
-  constexpr int kModelCount = 20;  // more than one transaction deletes
-  for (int i = 0; i < kModelCount; ++i) {
-    ASSERT_TRUE(Put(Sha256Hex(absl::StrCat(i)), SampleModel(3, 10)).ok());
-  }
-  std::set<std::string> deleted;
-  const auto note = [&](const std::string& digest, uint64_t) { deleted.insert(digest); };
-  ASSERT_TRUE(database_->models().Collect(0, {.dry_run = true, .on_deleted = note}).ok());
-  EXPECT_THAT(deleted, testing::IsEmpty());
-  ASSERT_TRUE(database_->models().Collect(0, {.on_deleted = note}).ok());
-  EXPECT_THAT(deleted, testing::SizeIs(kModelCount));
 }
 
 /// A clock that stands where it is set.

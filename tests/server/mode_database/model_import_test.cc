@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "server/base/sha256.h"
-#include "server/mode_database/mode_database.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
 namespace carillon {
@@ -12,17 +7,8 @@ namespace {
 
 using testing::HasSubstr;
 
-class ModelImportTest : public ::testing::Test {
+class ModelImportTest : public DatabaseTest {
  protected:
-  ModelImportTest() { Reopen(); }
-
-  void Reopen() {
-    database_.reset();
-    auto opened = ModeDatabase::Open(file_, clock_);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    database_ = *std::move(opened);
-  }
-
   absl::StatusOr<ModelSummary> Import(const ModalModel& model,
                                       Replacing replacing = Replacing::kNever,
                                       const std::string& label = "") {
@@ -50,21 +36,11 @@ class ModelImportTest : public ::testing::Test {
 
   /// Changes a byte of the stored mode shapes.
   void Damage() {
-    database_.reset();
-    std::string content = ReadBytes(file_);
-    const auto* const shapes = reinterpret_cast<const char*>(model_.shapes.data());
-    const size_t at = content.find(std::string(shapes, model_.shapes.size() * sizeof(float)));
-    ASSERT_NE(at, std::string::npos);
-    content[at] ^= 1;
-    WriteBytes(file_, content);
-    Reopen();
+    FlipABitWithin({reinterpret_cast<const char*>(model_.shapes.data()),
+                    model_.shapes.size() * sizeof(float)});
   }
 
-  TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "carillon.db";
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
-  const std::string digest_ = Sha256Hex("a");
+  const std::string& digest_ = a_;
   const ModalModel model_ = SampleModel(3, 4);
   const ModalModel other_ = SampleModel(2, 4);
   bool kept_ = false;

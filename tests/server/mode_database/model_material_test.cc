@@ -1,29 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include "server/base/sha256.h"
-#include "server/mode_database/mode_database.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 
 namespace carillon {
 namespace {
 
-class ModelMaterialTest : public ::testing::Test {
+class ModelMaterialTest : public DatabaseTest {
  protected:
-  ModelMaterialTest() { Reopen(); }
-
-  void Reopen() {
-    database_.reset();
-    auto opened = ModeDatabase::Open(file_, clock_);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    database_ = *std::move(opened);
-  }
-
-  void PutModel() {
-    WriteRecords(folder_ / "model", SampleRecords(SampleModel(3, 4)));
-    ASSERT_TRUE(database_->models().PutFile(digest_, "bell", folder_ / "model").ok());
-  }
+  void PutModel() { ASSERT_TRUE(DatabaseTest::PutModel(a_, SampleModel(3, 4), "bell").ok()); }
 
   static v1::Material Named(const std::string& preset) {
     v1::Material material;
@@ -33,25 +16,19 @@ class ModelMaterialTest : public ::testing::Test {
 
   /// The name of the remembered material; empty: there is none.
   std::string Remembered() {
-    const auto material = database_->models().Material(digest_);
+    const auto material = database_->models().Material(a_);
     EXPECT_TRUE(material.ok()) << material.status();
     return material.ok() && material->has_value() ? (*material)->preset() : "";
   }
-
-  TemporaryFolder folder_;
-  std::filesystem::path file_ = folder_ / "carillon.db";
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
-  const std::string digest_ = Sha256Hex("a");
 };
 
 TEST_F(ModelMaterialTest, IsKeptBeforeItsModelIsStoredAndWhenItIsReplaced) {
-  ASSERT_TRUE(database_->models().RememberMaterial(digest_, Named("bell_bronze")).ok());
+  ASSERT_TRUE(database_->models().RememberMaterial(a_, Named("bell_bronze")).ok());
   PutModel();
   PutModel();
   Reopen();
   EXPECT_EQ(Remembered(), "bell_bronze");
-  const auto summary = database_->models().Summary(digest_);
+  const auto summary = database_->models().Summary(a_);
   ASSERT_TRUE(summary.ok() && summary->material.has_value()) << summary.status();
   EXPECT_EQ(summary->material->preset(), "bell_bronze");
 }
@@ -59,10 +36,10 @@ TEST_F(ModelMaterialTest, IsKeptBeforeItsModelIsStoredAndWhenItIsReplaced) {
 TEST_F(ModelMaterialTest, TheNewestRequestSaysIt) {
   PutModel();
   EXPECT_EQ(Remembered(), "");
-  ASSERT_TRUE(database_->models().RememberMaterial(digest_, Named("steel")).ok());
-  ASSERT_TRUE(database_->models().RememberMaterial(digest_, Named("glass")).ok());
+  ASSERT_TRUE(database_->models().RememberMaterial(a_, Named("steel")).ok());
+  ASSERT_TRUE(database_->models().RememberMaterial(a_, Named("glass")).ok());
   EXPECT_EQ(Remembered(), "glass");
-  const auto changed = database_->models().Update(digest_, {.material = Named("oak")});
+  const auto changed = database_->models().Update(a_, {.material = Named("oak")});
   ASSERT_TRUE(changed.ok()) << changed.status();
   EXPECT_EQ(changed->material->preset(), "oak");
   EXPECT_EQ(Remembered(), "oak");

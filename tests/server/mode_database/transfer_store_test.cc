@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/mode_database/transfer_store.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <cmath>
 
 #include "server/mode_database/maintenance/database_admin.h"
-#include "server/mode_database/mode_database.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 #include "tests/server/mode_database/sample_transfer.h"
 
 namespace carillon {
@@ -20,18 +16,10 @@ using ::testing::Pointwise;
 
 constexpr double kSoundSpeed = 343;
 
-class TransferStoreTest : public ::testing::Test {
+class TransferStoreTest : public DatabaseTest {
  protected:
-  TransferStoreTest() { Reopen(); }
-
-  void Reopen() {
-    database_.reset();
-    database_ = *ModeDatabase::Open(file_, clock_);
-  }
-
   void PutModel(const ModalModel& model) {
-    WriteRecords(folder_ / "model", SampleRecords(model));
-    ASSERT_TRUE(database_->models().PutFile(digest_, "", folder_ / "model").ok());
+    ASSERT_TRUE(DatabaseTest::PutModel(digest_, model).ok());
   }
 
   absl::Status Put(const ModalModel& model, double speed_ratio, float integral = 2) {
@@ -49,12 +37,8 @@ class TransferStoreTest : public ::testing::Test {
     return transfer == nullptr ? 0 : transfer->power_integrals.front();
   }
 
-  TemporaryFolder folder_;
-  SystemClock clock_;
-  const std::filesystem::path file_ = folder_ / "carillon.db";
-  const std::string digest_ = std::string(64, 'a');
+  const std::string& digest_ = a_;
   const ModalModel model_ = SampleModel(3, 4);
-  std::unique_ptr<ModeDatabase> database_;
 };
 
 TEST_F(TransferStoreTest, TheNearestTransferServesMaterialsWithinFivePercent) {
