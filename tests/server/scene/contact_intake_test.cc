@@ -168,16 +168,9 @@ TEST(ContactIntake, LiveAndOfflineGiveTheSameVerdictsForTheSameReasons) {
   EXPECT_EQ(renderer->summary().last_rejection.code(), stream->last_rejection().code());
 }
 
-TEST(ContactIntake, CountsTheImpulsesThatItHandsOn) {
-  Mixer mixer;
-  SceneRegistry scenes(mixer);
-  Scene scene("a scene");
-  const uint64_t registered = *scenes.CreateScene();
-  ASSERT_TRUE(
-      scene.Insert(1, scenes.AddObject(registered, 1, SmallModel(), SmallProperties())->object)
-          .ok());
-  RecordingTarget target;
-  ContactIntake intake(scene, target, {.step_s = kStepS, .delay_s = 0.5});
+TEST_F(RecordedSceneTest, CountsTheImpulsesThatItHandsOn) {
+  RecordingTarget& target = target_;
+  ContactIntake intake(scene_, target, {.step_s = kStepS, .delay_s = 0.5});
   target.now = 4800;
   ASSERT_TRUE(intake.BeginStep(7).ok());
   intake.Strike(SmallImpulse(1, 1, 0.25));
@@ -188,23 +181,16 @@ TEST(ContactIntake, CountsTheImpulsesThatItHandsOn) {
   EXPECT_EQ(target.events[0].frame, 4800 + 0.75 * 48000);
   EXPECT_EQ(target.events[1].frame, 4800 + 0.5 * 48000);
   // An object that was removed meanwhile feels no more forces.
-  ASSERT_TRUE(scene.Remove(1).ok());
+  ASSERT_TRUE(scene_.Remove(1).ok());
   ASSERT_TRUE(intake.BeginStep(7 + kStepS).ok());
   intake.EndStep();
   EXPECT_EQ(target.events.size(), 4U);
   EXPECT_TRUE(intake.last_rejection().ok());
 }
 
-TEST(ContactIntake, RejectsAllReportsOfAStepFarAhead) {
-  Mixer mixer;
-  SceneRegistry scenes(mixer);
-  const uint64_t registered = *scenes.CreateScene();
-  Scene scene("a scene");
-  ASSERT_TRUE(
-      scene.Insert(1, scenes.AddObject(registered, 1, SmallModel(), SmallProperties())->object)
-          .ok());
-  RecordingTarget target;
-  ContactIntake intake(scene, target, {.step_s = kStepS});
+TEST_F(RecordedSceneTest, RejectsAllReportsOfAStepFarAhead) {
+  RecordingTarget& target = target_;
+  ContactIntake intake(scene_, target, {.step_s = kStepS});
   ASSERT_TRUE(intake.BeginStep(0).ok());
   intake.Hold({.contact = SmallImpulse(1).contact});
   intake.EndStep();
@@ -240,16 +226,8 @@ TEST(ContactIntake, SaysWhenTheFirstOfSeveralRejectionsWas) {
                                           "at 0.75 s: "));
 }
 
-/// A scene with two objects, and the events that an intake of it hands on.
-class ReadingTest : public testing::Test {
+class ReadingTest : public RecordedSceneTest {
  protected:
-  ReadingTest() {
-    for (const uint32_t handle : {1U, 2U}) {
-      const auto placed = scenes_.AddObject(registered_, handle, SmallModel(), SmallProperties());
-      EXPECT_TRUE(scene_.Insert(handle, placed->object).ok());
-    }
-  }
-
   ContactIntake Open(const ContactReading& reading) {
     ContactIntake intake(scene_, target_, {.step_s = kStepS, .reading = reading});
     EXPECT_TRUE(intake.BeginStep(0).ok());
@@ -259,12 +237,6 @@ class ReadingTest : public testing::Test {
   const SurfaceImpulse& Newest(size_t back = 0) const {
     return *target_.events.at(target_.events.size() - 1 - back).impulse();
   }
-
-  Mixer mixer_;
-  SceneRegistry scenes_{mixer_};
-  Scene scene_{"a scene"};
-  const uint64_t registered_ = *scenes_.CreateScene();
-  RecordingTarget target_;
 };
 
 TEST_F(ReadingTest, PointsAndImpulsesOfTheScenesFrameAreTurnedIntoTheObjects) {
@@ -325,8 +297,7 @@ TEST_F(ReadingTest, TheModesOfAThinBodyYieldToABlowWithoutADuration) {
   auto thin = std::make_shared<ModalModel>(*SmallModel());
   thin->digest = std::string(64, 'b');
   for (float& shape : thin->shapes) shape *= 77;  // as if each mode moved the whole body alike
-  const auto placed = scenes_.AddObject(registered_, 3, thin, SmallProperties());
-  ASSERT_TRUE(scene_.Insert(3, placed->object).ok());
+  Insert(3, thin);
   ContactIntake cosine = Open({}), gaussian = Open({.gaussian_pulses = true});
   ObjectImpulse impulse = SmallImpulse(3, 0.02);
   const auto newest_gains = [&] {

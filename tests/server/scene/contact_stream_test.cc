@@ -265,38 +265,6 @@ TEST_F(ContactStreamTest, TheDelayIsOneStepOneBlockAndFiveMillisecondsUnlessGive
   EXPECT_EQ(Open(0)->scheduling_delay_s(), 0);
 }
 
-TEST_F(ContactStreamTest, AnImpulseThatCannotBeUsedIsRejectedWithItsReasonAndTheRestSounds) {
-  const auto stream = Open(0.01);
-  ASSERT_TRUE(stream->intake().BeginStep(0).ok());
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  ObjectImpulse off_surface = SmallImpulse(1);
-  off_surface.contact.impulse.location = SurfacePoint{.triangle = 4};
-  ObjectImpulse nowhere = SmallImpulse(1);
-  nowhere.contact.impulse.location = Point{nan, 0, 0};
-  ObjectImpulse endless = SmallImpulse(1);
-  endless.contact.impulse.duration_s = 0.2;
-  const std::vector<std::pair<ObjectImpulse, const char*>> cases = {
-      {SmallImpulse(9), "OBJECT_NOT_FOUND: "},
-      {SmallImpulse(1, nan), "CONTACT_MALFORMED: "},
-      {off_surface, "CONTACT_MALFORMED: "},
-      {nowhere, "CONTACT_MALFORMED: "},
-      {endless, "CONTACT_MALFORMED: "},
-      {SmallImpulse(1, 1, -0.001), "CONTACT_MALFORMED: "},
-      {SmallImpulse(1, 1, nan), "CONTACT_MALFORMED: "},
-      {SmallImpulse(1, 1, 61), "TIME_TOO_FAR_AHEAD: "},
-  };
-  for (const auto& [impulse, reason] : cases) {
-    stream->intake().Strike(impulse);
-    stream->intake().EndStep();
-    EXPECT_THAT(stream->last_rejection().ToString(), HasSubstr(reason));
-  }
-  stream->intake().Strike(SmallImpulse(1));
-  stream->intake().EndStep();
-  EXPECT_LT(Onset(Render(4800)), 4800U);
-  EXPECT_EQ(stream->counts().rejected_count, cases.size());
-  EXPECT_EQ(stream->counts().accepted_count, 1U);
-}
-
 TEST_F(ContactStreamTest, RefusesATimeThatGoesBackOrIsNone) {
   const auto stream = Open(0.01);
   ASSERT_TRUE(stream->intake().BeginStep(1).ok());

@@ -32,15 +32,8 @@ ObjectImpulse ImpulseAt(const Point& point, const Vector3& newton_seconds) {
   return impulse;
 }
 
-class StepImpulsesTest : public testing::Test {
+class StepImpulsesTest : public RecordedSceneTest {
  protected:
-  StepImpulsesTest() {
-    for (const uint32_t handle : {1U, 2U}) {
-      const auto placed = scenes_.AddObject(registered_, handle, SmallModel(), SmallProperties());
-      EXPECT_TRUE(scene_.Insert(handle, placed->object).ok());
-    }
-  }
-
   /// Returns the events of a step with these impulses.
   std::vector<MixerEvent> Strike(const std::vector<ObjectImpulse>& impulses,
                                  const ContactReading& reading = {}) {
@@ -54,11 +47,6 @@ class StepImpulsesTest : public testing::Test {
     return std::exchange(target_.events, {});
   }
 
-  Mixer mixer_;
-  SceneRegistry scenes_{mixer_};
-  Scene scene_{"a scene"};
-  const uint64_t registered_ = *scenes_.CreateScene();
-  RecordingTarget target_;
   std::vector<BlowRecord> blows_;
   uint64_t impulse_count_ = 0;
   absl::Status rejection_;
