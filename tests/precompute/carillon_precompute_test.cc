@@ -193,27 +193,6 @@ TEST_F(CarillonPrecomputeTest, AThinPlateIsDividedFinelyEnoughUnlessNodesAreGive
   EXPECT_LT(2 * ReadRecords(model)[0].header().node_count(), nodes);
 }
 
-TEST_F(CarillonPrecomputeTest, UnitMayBeANumberOfMetres) {
-  const auto volume_m3 = [&](const std::string& unit) {
-    Run(bar + " --out " + model + " --unit " + unit + " --element linear --nodes 100 " + kSteel);
-    const std::vector<v1::ModalModelRecord> records = ReadRecords(model);
-    return records.empty() ? 0 : records[0].header().volume_m3();
-  };
-  EXPECT_EQ(volume_m3("0.001"), volume_m3("mm"));
-  std::filesystem::remove(model);
-  EXPECT_EQ(ReasonOf(Run(bar + " --out " + model + " --unit ell --json " + kSteel)),
-            "INVALID_SETTINGS");
-}
-
-TEST_F(CarillonPrecomputeTest, TwiceTheSizeSoundsAnOctaveLower) {
-  const Json one = Json::parse(RunBar(kSteel).output);
-  const Json two = Json::parse(RunBar(std::string(kSteel) + " --size 2").output);
-  EXPECT_NEAR(one.at("modes")[0].at("frequency_hz").get<double>() /
-                  two.at("modes")[0].at("frequency_hz").get<double>(),
-              2, 1e-9);
-  EXPECT_GT(two.at("modes").size(), one.at("modes").size());
-}
-
 TEST_F(CarillonPrecomputeTest, BodyWithoutAModeInTheBandIsToldItsFirst) {
   const Result full = RunBar(kSteel);
   std::filesystem::remove(model);
@@ -260,19 +239,6 @@ TEST_F(CarillonPrecomputeTest, BarFixedAtOneEndBendsLowerThanAFreeOne) {
   EXPECT_EQ(header.verification().sturm_count(), header.mode_count());
   ASSERT_EQ(header.settings().fixtures_size(), 1);
   EXPECT_EQ(header.settings().fixtures(0).box().high_m().y(), 0.02);
-}
-
-TEST_F(CarillonPrecomputeTest, FixturesThatHoldNothingAreRefused) {
-  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix floor")), "INVALID_SETTINGS");
-  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix group:base")), "GROUP_UNKNOWN");
-  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix vertices:8")), "NO_VERTEX_FIXED");
-  EXPECT_EQ(ReasonOf(RunBar(std::string(kSteel) + " --fix plane:0,0,0/-1,0,0")),
-            "ALL_VERTICES_FIXED");
-}
-
-TEST_F(CarillonPrecomputeTest, OpenSurfaceIsRefused) {
-  std::ofstream(bar, std::ios::trunc) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\n";
-  EXPECT_EQ(ReasonOf(RunBar(kSteel)), "MESH_NOT_CLOSED");
 }
 
 struct WorkerEventsTest : CarillonPrecomputeTest {

@@ -100,19 +100,6 @@ TEST_F(ProgramFindingsTest, PartsThatShareAFaceAreOneBodyOfOneMaterial) {
   EXPECT_NEAR(first_hz() / whole_hz, 1, 0.005) << "the estimated errors";
 }
 
-TEST_F(ProgramFindingsTest, SizePutsTheFirstModeIntoANarrowBand) {
-  const Result result = RunBar(std::string(kSteel) + " --band 20:30");
-  EXPECT_EQ(ReasonOf(result), "NO_MODE_IN_BAND");
-  const Json error = Json::parse(result.output).at("error");
-  for (const Json& remedy : error.at("remedies")) {
-    if (remedy.at("option") != "--size") continue;
-    const std::string size = remedy.at("value");
-    EXPECT_EQ(RunBar(std::string(kSteel) + " --band 20:30 --size " + size).exit_status, 0);
-    return;
-  }
-  FAIL() << "no size";
-}
-
 TEST_F(ProgramFindingsTest, TheRemediesOfTooManyModesWork) {
   const std::string options = bar + " --out " + model +
                               " --unit mm --json --element linear --nodes 1700 --size 300" + kSteel;

@@ -11,7 +11,6 @@
 #include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/eigen/verification.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/spectra_check.h"
 #include "precompute/sparse/openblas.h"
 #include "tests/precompute/test_meshes.h"
 
@@ -95,13 +94,6 @@ TEST(BlockLanczos, ThreadsChangeRoundingOnly) {
   SetThreadCount(1);
   ExpectSameModes(body.system, together, alone);
   EXPECT_LT(WorstShape(body.system, together, alone), 1e-8);
-}
-
-TEST(BlockLanczos, AgreesWithSpectraOnATube) {
-  Body body(MakeTetTube({.around = 16, .along = 30}, 10), MassSharing::kConsistent);
-  const ModeRequest request{.count = 60, .eigenvalue_limit = kLimit};
-  const Modes spectra = SolveWithSpectra(body.system, request).value();
-  ExpectSameModes(body.system, body.Solve(60), spectra);
 }
 
 TEST(BlockLanczos, LeavesSmallTrueResiduals) {

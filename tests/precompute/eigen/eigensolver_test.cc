@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "precompute/eigen/eigensolver.h"
-
 #include <gtest/gtest.h>
 
 #include "precompute/eigen/dense_eigensolver.h"
 #include "precompute/eigen/verification.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/spectra_check.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -17,48 +14,6 @@ constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
 
 SystemMatrices AssembleUnit(const TetMesh& mesh) {
   return Assemble(mesh, kElastic, 1, MassSharing::kConsistent);
-}
-
-/// The modes that bend, of which `count` are wanted.
-Modes SolveSparse(const SystemMatrices& system, int count, double limit) {
-  const absl::StatusOr<Modes> modes =
-      SolveWithSpectra(system, {.count = count, .eigenvalue_limit = limit});
-  EXPECT_TRUE(modes.ok()) << modes.status();
-  return *modes;
-}
-
-TEST(Eigensolver, DenseAndSparseAgree) {
-  const SystemMatrices system = AssembleUnit(MakeTetBox({1, 0.6, 0.3}, {5, 3, 2}, 10));
-  const absl::StatusOr<Modes> dense =
-      DenseEigensolver().Solve(system, {.count = 30, .eigenvalue_limit = 0}, kSilent);
-  ASSERT_TRUE(dense.ok()) << dense.status();
-  const Modes sparse = SolveSparse(system, 30, dense->eigenvalues[29]);
-  for (Eigen::Index m = 6; m < 30; ++m) {
-    // The dense solution is exact to rounding of the highest eigenvalue, 1e6 times the lowest.
-    EXPECT_NEAR(sparse.eigenvalues[m] / dense->eigenvalues[m], 1, 1e-9) << m;
-    const double overlap =
-        dense->shapes.col(m).dot(system.M.selfadjointView<Eigen::Lower>() * sparse.shapes.col(m));
-    EXPECT_NEAR(std::abs(overlap), 1, 1e-6) << m;
-  }
-}
-
-TEST(Eigensolver, SparseModesFulfilTheirDefinition) {
-  const SystemMatrices system = AssembleUnit(MakeTetTube({.around = 12, .along = 20}, 10));
-  Modes modes = SolveSparse(system, 26, 0.01);
-  EXPECT_LT(OrthogonalityError(system, modes.shapes), 1e-10);
-  modes.eigenvalues = modes.eigenvalues.tail(20).eval();
-  modes.shapes = modes.shapes.rightCols(20).eval();
-  EXPECT_LT(Residuals(system, modes).maxCoeff(), 1e-6);
-}
-
-// Every cell of the tube is cut alike, so that the mesh has the tube's rotations by a twelfth: its
-// bending modes come in pairs of exactly one frequency, of which no solver may lose one.
-TEST(Eigensolver, DegeneratePairsStayPairs) {
-  const SystemMatrices system = AssembleUnit(MakeTetTube({.around = 12, .along = 20}, 4));
-  const Modes modes = SolveSparse(system, 12, 0.01);
-  EXPECT_NEAR(modes.eigenvalues[7] / modes.eigenvalues[6], 1, 1e-8);
-  EXPECT_NEAR(modes.eigenvalues[9] / modes.eigenvalues[8], 1, 1e-8);
-  EXPECT_GT(modes.eigenvalues[8] / modes.eigenvalues[7], 1.5);
 }
 
 TEST(RigidBodyModes, AreOrthonormalAndWithoutEnergy) {

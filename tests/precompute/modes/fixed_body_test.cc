@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Bodies that are fixed: every solver finds the modes of the nodes that move.
+// Bodies that are fixed: the solvers find the modes of the nodes that move.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +11,6 @@
 #include "precompute/modes/deformation_modes.h"
 #include "precompute/modes/error_estimate.h"
 #include "precompute/modes/rigid_body.h"
-#include "precompute/modes/spectra_check.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -110,17 +109,6 @@ TEST_P(FixedBodyTest, LowestEigenvalueBoundLiesAboveTheLowestModeAndNearIt) {
   EXPECT_GT(bound, lowest * (1 - 1e-9));
   // It sets the scale of a shift, for which two decades are as good.
   EXPECT_LT(bound, 30 * lowest);
-}
-
-TEST_P(FixedBodyTest, SpectraFindsTheSameModes) {
-  const auto ours = SolveDeformationModes(system, mesh, 60, kSilent);
-  ASSERT_TRUE(ours.ok()) << ours.status();
-  const auto count = static_cast<int>(ours->modes.eigenvalues.size());
-  const auto spectra = SolveWithSpectra(system, {.count = rigid + count, .eigenvalue_limit = 60});
-  ASSERT_TRUE(spectra.ok()) << spectra.status();
-  for (Eigen::Index m = 0; m < count; ++m) {
-    EXPECT_NEAR(spectra->eigenvalues[rigid + m] / ours->modes.eigenvalues[m], 1, 1e-8) << m;
-  }
 }
 
 // Dense and block Lanczos, linear and quadratic elements, both mass matrices, all ranks.

@@ -166,14 +166,14 @@ TEST(PrepareSurface, AWideHoleIsFilledWhereItIs) {
   }
 }
 
-TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouth) {
+/// A vessel whose mouth is as wide as itself.
+SurfaceMesh OpenCup() {
   SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
   std::erase_if(cup.triangles, [&](const auto& triangle) {
     return std::ranges::all_of(
         triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
   });
-  EXPECT_THAT(PrepareSurface(cup, {.repair = true}).status().ToString(),
-              HasSubstr("MESH_NOT_CLOSED"));
+  return cup;
 }
 
 TEST(PrepareSurface, AHoleInAFlatFaceIsClosedWhateverItsSize) {
@@ -189,14 +189,10 @@ TEST(PrepareSurface, AHoleInAFlatFaceIsClosedWhateverItsSize) {
   }
 }
 
-TEST(PrepareSurface, AWideHoleIsNamedWithWhatRepairCloses) {
-  SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
-  std::erase_if(cup.triangles, [&](const auto& triangle) {
-    return std::ranges::all_of(
-        triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
-  });
-  EXPECT_THAT(PrepareSurface(cup, {.repair = true}).status().ToString(),
-              HasSubstr("the surface has a hole about 0.1 m wide"));
+TEST(PrepareSurface, AVesselIsNotFilledThroughItsMouthWhoseWidthIsNamed) {
+  EXPECT_THAT(
+      PrepareSurface(OpenCup(), {.repair = true}).status().ToString(),
+      AllOf(HasSubstr("MESH_NOT_CLOSED"), HasSubstr("the surface has a hole about 0.1 m wide")));
 }
 
 TEST(PrepareSurface, AFoldIsUntangledWhereItIs) {
@@ -299,11 +295,7 @@ TEST(PrepareSurface, AWallIsNotAdvisedAndRefusedWhereTheSurfaceHasTwoSides) {
 }
 
 TEST(PrepareSurface, AFailedRepairNamesTheFirstFaultToo) {
-  SurfaceMesh cup = MakeBoxSurface({0.1, 0.1, 0.2});
-  std::erase_if(cup.triangles, [&](const auto& triangle) {
-    return std::ranges::all_of(
-        triangle, [&](int32_t v) { return cup.vertices[static_cast<size_t>(v)][2] > 0.19; });
-  });
+  SurfaceMesh cup = OpenCup();
   cup.triangles.push_back(cup.triangles[0]);
   const absl::Status failed = PrepareSurface(cup, {.repair = true}).status();
   EXPECT_THAT(failed.ToString(),
