@@ -8,7 +8,7 @@ import grpc
 
 import meshes
 import strike
-from carillon.v1 import audio_service_pb2, contact_pb2, error_pb2, material_pb2
+from carillon.v1 import contact_pb2, error_pb2, material_pb2
 from carillon.v1 import modal_model_service_pb2, scene_service_pb2
 from daemon import BIN, DaemonTest
 
@@ -115,29 +115,6 @@ class RefusalTest(DaemonTest):
                                     check=False)
         self.assertEqual(ended.returncode, 1)
         self.assertIn("carillon: MESH_TOO_LARGE: ", ended.stderr)
-
-    def test_other_requests_say_what_is_wrong(self):
-        absent = "modalModels/" + 64 * "0"
-        cases = {
-            "MODAL_MODEL_NOT_FOUND": lambda: self.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
-                scene=self.scene, objects=[scene_service_pb2.NewObject(modal_model=absent, material=MATERIAL)])),
-            "SCENE_NOT_FOUND": lambda: self.client.strike("scenes/none", []),
-            "UNKNOWN_MATERIAL": lambda: self.client.create(
-                meshes.bar(), "obj", material=material_pb2.Material(preset="cheese")),
-            "MESH_FORMAT_UNKNOWN": lambda: self.client.create(meshes.bar(), "fbx",
-                                                              material=MATERIAL),
-            "OBJECT_NOT_FOUND": lambda: self.client.strike(self.scene, [contact_pb2.Contact(
-                kind=contact_pb2.CONTACT_KIND_IMPACT, object=77, point_m=contact_pb2.Vec3(),
-                impulse_newton_seconds=contact_pb2.Vec3(x=1))]),
-            "TRACE_MALFORMED": lambda: list(self.client.audio.Render(iter([
-                audio_service_pb2.RenderRequest(record={"object": {"handle": 1}})]))),
-        }
-        for reason, call in cases.items():
-            with self.subTest(reason):
-                info = self.refusal(call)
-                self.assertEqual(info.reason, reason)
-                self.assertGreater(len(info.message), 10)
-
 
 class CommandLineTest(DaemonTest):
     def command(self, *arguments):

@@ -86,21 +86,6 @@ TEST_F(NpzModel, WhatAResearcherLeavesOutIsMade) {
   EXPECT_EQ(read->header.settings().poisson_ratio(), 0.3);
 }
 
-TEST_F(NpzModel, ArraysInFortransOrderAreTurned) {
-  // Row-major 4 by 3 as NumPy stores its transpose's memory: column by column.
-  std::vector<double> columns;
-  for (size_t axis = 0; axis < 3; ++axis) {
-    for (size_t v = 0; v < 4; ++v) columns.push_back(model_.vertices[3 * v + axis]);
-  }
-  std::vector<ZipEntry> entries = Least();
-  entries[1] = Entry("vertices", "<f8", {4, 3}, columns);
-  const size_t at = entries[1].head.find("False");
-  entries[1].head.replace(at, 5, "True ");
-  const auto read = ReadBack(entries);
-  ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_EQ(read->vertices, model_.vertices);
-}
-
 TEST_F(NpzModel, AModelWithoutWhatItNeedsIsIncomplete) {
   for (const size_t missing : {0U, 1U, 2U, 3U, 4U}) {
     std::vector<ZipEntry> entries = Least();

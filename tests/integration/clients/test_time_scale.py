@@ -7,7 +7,6 @@ import unittest
 import numpy
 
 import carillon
-from carillon.v1 import audio_service_pb2
 from test_python_package import DURATION_S, IMPULSE, POINT, PackageTest
 
 STEP_S, BLOW_EVERY, STEP_COUNT, RATE_HZ = 1 / 64, 8, 33, 48000
@@ -62,31 +61,6 @@ class TimeScaleTest(PackageTest):
         self.assertEqual(paused.summary.accepted_count, 2)
         numpy.testing.assert_allclose(onsets_s(paused.samples[:, 0]) - onsets_s(usual.samples[:, 0]), [0, 1], atol=1e-4)
         self.assertEqual([one.id for one in paused.summary.warnings], [])
-
-    def test_a_live_stream_spreads_blows_and_a_pause_without_steps_is_no_mistake(self):
-        with self.c.scene() as scene:
-            bar = scene.add(self.model, DEAD)
-            answers = self.c.audio_stub.Listen(audio_service_pb2.ListenRequest(scene=scene.name))
-            self.addCleanup(answers.cancel)
-            next(answers)
-            # The delay lets all steps come at once.
-            with scene.stream(STEP_S, delay=0.5) as stream:
-                for time_s, content in blows(bar, 0.5):
-                    stream.step(time_s, **content)
-            heard = []
-            while len(heard) < 700:
-                heard.append(numpy.frombuffer(next(answers).block.samples, "<f4"))
-        self.assertEqual(stream.report.accepted_count, 5)
-        numpy.testing.assert_allclose(numpy.diff(onsets_s(numpy.concatenate(heard))), [0.25] * 4, atol=2e-4)
-
-    def test_a_step_of_a_performance_lasts_the_step_over_its_scale(self):
-        with self.c.perform(step=STEP_S, microphones=[carillon.Omni(at=(0, 0, 1))]) as sound:
-            bar = sound.add(self.model, DEAD)
-            frames = [sound.step(impacts=carillon.Impacts(bar, **BLOW), time_scale=scale)[0].shape[2]
-                      for scale in (1, 0.25, 4, 0, None)]
-            self.assertEqual(frames, [750, 3000, 188, 750, 750])
-            with self.assertRaisesRegex(carillon.CarillonError, "INVALID_STREAM.* lasts 15.6"):
-                sound.step(time_scale=0.001)
 
     def test_a_scale_that_is_none_is_refused(self):
         for wrong in (-1, 1e-4, 1e4, float("nan"), "slow"):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commands that look after stored models, with a running daemon and without."""
 
-import hashlib
 import json
 import lzma
 import os
@@ -17,11 +16,7 @@ import numpy
 
 import carillon
 import scripted
-import strike
-from carillon.v1 import admin_service_pb2, admin_service_pb2_grpc
 from daemon import BIN, ROOT, Daemon
-
-import grpc
 
 
 def allow_small_files_only():
@@ -41,10 +36,7 @@ class DatabaseCommandsTest(unittest.TestCase):
         scratch = tempfile.TemporaryDirectory(prefix="carillon-")
         self.addCleanup(scratch.cleanup)
         self.folder = pathlib.Path(scratch.name)
-        access = self.folder / "access"
-        access.touch(0o600)
-        access.write_text(f"keeper administer sha256:{hashlib.sha256(b'a token for this test').hexdigest()}\n")
-        self.daemon = Daemon(self.folder, "--listen", "127.0.0.1:0", "--access-file", access)
+        self.daemon = Daemon(self.folder)
         self.addCleanup(lambda: self.daemon.stop())
         self.name = self.run_command("model", "import", self.model_file, "--label", "bar").strip()
 
@@ -228,40 +220,6 @@ class DatabaseCommandsTest(unittest.TestCase):
         self.assertRegex(failed.stderr, "DATABASE_(FULL|IO_ERROR|UNUSABLE): ")
         self.assertEqual(self.offline("check").stdout.splitlines(), ["models: 1, meshes: 0, jobs: 0", "0 faults"])
         self.assertEqual(sorted(path.name for path in data.iterdir()), names)
-
-    def test_a_database_behind_a_link_is_replaced_where_it_is(self):
-        backup = self.folder / "backup.db"
-        self.run_command("db", "backup", backup)
-        self.run_command("model", "delete", "bar")
-        self.daemon.stop()
-        elsewhere = self.folder / "elsewhere"
-        elsewhere.mkdir()
-        link = self.folder / "data/carillon.db"
-        link.rename(elsewhere / "real.db")
-        link.symlink_to(elsewhere / "real.db")
-        restored = self.offline("restore", backup)
-        self.assertEqual(restored.returncode, 0, restored.stderr)
-        self.assertIn("elsewhere/real.db.replaced", restored.stdout)
-        self.assertTrue(link.is_symlink())
-        self.daemon.start()
-        self.assertIn("bar", self.run_command("model", "list"))
-        self.assertTrue((elsewhere / "real.db-wal").exists())
-        (elsewhere / "real.db").unlink()
-        refused = self.daemon.command("model", "delete", "bar", check=False)
-        self.assertIn("DATABASE_LOST: ", refused.stderr)
-
-    def test_over_tcp_only_the_token_makes_an_administrator(self):
-        address = next(line.split()[-1] for line in self.daemon.listening if "127.0.0.1" in line)
-        admin = admin_service_pb2_grpc.AdminServiceStub(grpc.insecure_channel(address))
-        request = admin_service_pb2.GetDatabaseStatsRequest()
-        for metadata, reason in (((), "CREDENTIAL_MISSING"),
-                                 ((("authorization", "Bearer another token"),), "TOKEN_WRONG")):
-            with self.assertRaises(grpc.RpcError) as refused:
-                admin.GetDatabaseStats(request, metadata=metadata)
-            self.assertEqual(strike.refusal(refused.exception).info.reason, reason)
-        shown = (("authorization", "Bearer a token for this test"),)
-        self.assertEqual(admin.GetDatabaseStats(request, metadata=shown).model_count, 1)
-
 
 class UpgradeTest(unittest.TestCase):
     """schema_1.db.xz was written by the programs of the first schema: it has a model of a bar, and a job that had not
