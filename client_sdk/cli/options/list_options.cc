@@ -116,12 +116,6 @@ void AddMaterials(CLI::App& app, Program& program) {
   CLI::App& material = *app.add_subcommand(
       "material", "List the named materials, show the figures of one, or find one by recordings");
   material.add_option("material", *name, "The name of a material [a list of all]");
-  AddAbout(material, "show", "Show the figures of a material", "The name of the material",
-           [&program](const std::string& shown) {
-             program.command = [&program, shown] {
-               return ShowMaterial(*program.Daemon(), shown, program.json);
-             };
-           });
   AddMaterialFit(material, program);
   material.callback([&program, &material, name] {
     if (!material.get_subcommands().empty()) return;
