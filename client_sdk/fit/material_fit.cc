@@ -28,6 +28,10 @@ constexpr double kLeastDecays = 0.5;
 /// What else a recording has, against its strongest line: it moves the decays of weak lines.
 constexpr double kElse = 1e-3;
 constexpr double kLeastLoudness_db = 20;
+/// Strikes that are cut sooner than this have few lines because of that.
+constexpr double kLeastStrike_s = 0.2;
+/// Densities of solid bodies: from foams to osmium.
+constexpr double kLeastDensity = 5, kMostDensity = 25'000;
 
 absl::Status TooFew(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TOO_FEW_MODES",
@@ -36,9 +40,24 @@ absl::Status TooFew(absl::string_view what) {
                               "places, and hang the body by a thread so that it rings"));
 }
 
+absl::StatusOr<double> Believable(double density, absl::string_view where,
+                                  absl::string_view repair) {
+  if (density >= kLeastDensity && density <= kMostDensity) return density;
+  return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
+                 absl::StrFormat("the density%s is %.3g kg/m^3, and no solid body's is: give %s",
+                                 where, density, repair));
+}
+
 absl::StatusOr<double> DensityOf(const FittedBody& first, const FitSettings& settings) {
-  if (settings.mass_kg && first.volume_m3 > 0) return *settings.mass_kg / first.volume_m3;
-  if (settings.density_kg_per_m3) return *settings.density_kg_per_m3;
+  if (settings.mass_kg && first.volume_m3 > 0) {
+    return Believable(
+        *settings.mass_kg / first.volume_m3,
+        absl::StrFormat(", the mass over the model's volume of %.4g cm^3,", first.volume_m3 * 1e6),
+        "the mass in kg, or make the model with the unit of its mesh (--unit)");
+  }
+  if (settings.density_kg_per_m3) {
+    return Believable(*settings.density_kg_per_m3, "", "the density in kg/m^3");
+  }
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",
                  absl::StrCat("frequencies give only Young's modulus divided by the density",
                               settings.mass_kg ? ", and the volume of the model is unknown: give "
@@ -103,8 +122,9 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
         absl::StatusCode::kInvalidArgument, "MESH_DISAGREES",
         absl::StrFormat(
             "%d of %d lines match, %.2f %% apart, which a wrong mesh reaches by chance. Measure "
-            "the body again, above all its thickness, and make a model of the right mesh; or "
-            "record strikes at more places",
+            "the body again, above all its thickness, and make a model of the right mesh; see "
+            "that all recordings are of this body and not clipped; or record strikes at more "
+            "places",
             best.lines.size(), line_count, 100 * best.rms));
   }
   return absl::OkStatus();
@@ -199,8 +219,23 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
 
 absl::Status CheckModes(const std::vector<Ring>& rings, const std::vector<MeasuredMode>& modes) {
   if (modes.size() >= kFewestModes) return absl::OkStatus();
+  double longest_s = 0;
+  for (const Ring& ring : rings) {
+    longest_s = std::max(
+        longest_s, static_cast<double>(ring.samples.size() - ring.onset) / ring.sample_rate_hz);
+  }
+  if (longest_s < kLeastStrike_s) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "TOO_FEW_MODES",
+        rings.empty()
+            ? "the recordings have no strike: they are silent, or end within 0.05 s of it; record "
+              "a second or two of each strike"
+            : absl::StrFormat("the recordings end %.2g s after the strike, and %d lines stand out: "
+                              "record a second or two of each strike",
+                              longest_s, modes.size()));
+  }
   const double loudness_db = LoudnessDb(rings);
-  if (!rings.empty() && loudness_db < kLeastLoudness_db) {
+  if (loudness_db < kLeastLoudness_db) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "RECORDING_TOO_NOISY",
         absl::StrFormat(

@@ -394,7 +394,16 @@ void TellRoomApart(const std::vector<Band>& bands, const Progress& progress,
     RefineInRoom(extracted.room, all[b]);
     for (const BandMode& refined : all[b].modes) {
       MeasuredMode& mode = extracted.modes[refined.index];
-      mode.frequency_hz = bands[b].centre_hz() + refined.frequency_hz;
+      // A room moves no line by its width: the likelihood has lost such a line, whose decay is then
+      // as good as unknown.
+      const double moved_hz = bands[b].centre_hz() + refined.frequency_hz - mode.frequency_hz;
+      const double width_hz = mode.decay_per_s / std::numbers::pi;
+      if (std::abs(moved_hz) > std::max(width_hz, 3 * mode.frequency_error_hz)) {
+        mode.decay_error_per_s = mode.decay_per_s;
+        continue;
+      }
+      mode.frequency_hz += moved_hz;
+      mode.frequency_error_hz = std::hypot(mode.frequency_error_hz, moved_hz);
       mode.decay_per_s = refined.decay_per_s;
       const double ratio = refined.decay_per_s / extracted.room.decay_per_s;
       const double least = std::max(kLeastErrorInRoom, kErrorAtRoom * ratio);

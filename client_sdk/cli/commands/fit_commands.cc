@@ -30,6 +30,8 @@ struct Source {
   fit::FittedBody body;
   Extracted extracted;
   std::vector<std::string> files;
+  /// Why the radiation of the model is not known, with what repairs it; empty if it is known.
+  std::string no_air;
 };
 
 absl::StatusOr<fit::ModelLines> LinesOf(const v1::ModalModelSummary& model) {
@@ -75,8 +77,18 @@ std::vector<double> RadiationOf(const v1::ModalModelSummary& model, double speed
   return decays;
 }
 
+/// Says why RadiationOf found nothing.
+std::string WhyNoAir(const v1::ModalModelSummary& model, const std::string& name) {
+  if (model.transfers().empty()) {
+    return absl::StrCat("the model has no transfer yet; carillon transfer ", name,
+                        " computes it, and then fit again");
+  }
+  return "the model's transfers are for another speed of sound than was found; create the model "
+         "again with this material, and fit again";
+}
+
 absl::StatusOr<Source> ReadSource(const std::vector<std::string>& files) {
-  Source source{.body = {}, .extracted = {}, .files = files};
+  Source source{.body = {}, .extracted = {}, .files = files, .no_air = {}};
   std::vector<std::string> recordings;
   for (const std::string& file : files) {
     if (!absl::EndsWithIgnoreCase(file, ".csv")) {
@@ -120,7 +132,15 @@ v1::Material MaterialOf(const fit::MaterialFit& fit) {
   return material;
 }
 
-std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+/// How an error of the mesh's size changes the Young's modulus that is found.
+std::string SizeCaution(const FitOptions& options) {
+  return options.settings.mass_kg
+             ? "one percent in thickness is about three in E, one percent all over is one"
+             : "one percent in size is two in E";
+}
+
+std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Source>& sources,
+                             const FitOptions& options) {
   std::string text = "# A material that carillon material fit found.\n";
   for (const Source& source : sources) {
     absl::StrAppend(&text, "# Body ", source.body.name, ": ", absl::StrJoin(source.files, ", "),
@@ -130,20 +150,27 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
                         "# E/rho %.5g m^2/s^2 +- %.2g %%, Poisson's ratio +- %.2g (two standard "
                         "errors); %d lines matched, %.2g %% apart,\n"
                         "# the next best match %.1f nepers behind. A wrong size of the mesh hides "
-                        "in E: one percent in size is two in E.\n",
+                        "in E: %s.\n",
                         fit.young_over_density, 200 * fit.young_over_density_error,
-                        2 * fit.poisson_error, fit.matched_count, 100 * fit.rms, fit.log_odds);
+                        2 * fit.poisson_error, fit.matched_count, 100 * fit.rms, fit.log_odds,
+                        SizeCaution(options));
   if (fit.laws.empty()) {
-    absl::StrAppendFormat(&text,
-                          "# The decays of only %d of the matched lines are known, so that no "
-                          "damping was found: give it beside this file.\n",
-                          fit.decay_count);
+    absl::StrAppendFormat(
+        &text,
+        "# The decays of only %d of the matched lines are known, so that no "
+        "damping was found: fit again with --damping, or give --loss-factor beside this file.\n",
+        fit.decay_count);
   } else {
     absl::StrAppendFormat(&text,
                           "# Damping: %s, within a factor of %.2f of half of the decay rates, "
                           "known from %.0f to %.0f Hz.\n",
                           fit.laws[0].Name(), fit.laws[0].missed_by, fit.decays_from_hz,
                           fit.decays_to_hz);
+  }
+  for (const Source& source : sources) {
+    if (fit.laws.empty() || source.no_air.empty()) continue;
+    absl::StrAppend(&text, "# The damping includes what ", source.body.name,
+                    " radiates: ", source.no_air, ".\n");
   }
   return absl::StrCat(text, MaterialOf(fit).DebugString());
 }
@@ -210,7 +237,10 @@ Json ToJson(const fit::FittedBody& body, const fit::MaterialFit& fit) {
 Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
   Json lines = Json::array(), candidates = Json::array(), laws = Json::array(),
        bodies = Json::array();
-  for (const Source& source : sources) bodies.push_back(ToJson(source.body, fit));
+  for (const Source& source : sources) {
+    bodies.push_back(ToJson(source.body, fit));
+    bodies.back()["air_subtracted"] = source.no_air.empty();
+  }
   for (const fit::FittedLine& line : fit.lines) lines.push_back(ToJson(line, sources));
   for (const fit::DampingLaw& law : fit.laws) laws.push_back(ToJson(law));
   for (const fit::Match& match : fit.candidates) {
@@ -279,7 +309,8 @@ void PrintLines(const fit::MaterialFit& fit, const std::vector<Source>& sources)
   }
 }
 
-void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
+void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
+              const FitOptions& options) {
   absl::PrintF("%d of %s matched, %.2g %% apart; the next best match is %.1f nepers behind\n",
                fit.matched_count, Counted(fit.lines.size(), "line"), 100 * fit.rms, fit.log_odds);
   absl::PrintF("E/rho       %.5g m^2/s^2 +- %.2g %% (two standard errors)\n",
@@ -317,12 +348,15 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
         Counted(fit.decay_count, "line"), fit.decays_from_hz, fit.decays_to_hz);
   }
   for (const Source& source : sources) {
+    if (!fit.laws.empty() && !source.no_air.empty()) {
+      absl::PrintF("air         what %s radiates is in the damping: %s\n", source.body.name,
+                   source.no_air);
+    }
     if (!source.extracted.rings.empty()) PrintRoom(source.extracted.room);
   }
   PrintLines(fit, sources);
-  absl::PrintF(
-      "\nA wrong size of the mesh hides in E and cannot be seen: one percent in size is two in "
-      "E.\n");
+  absl::PrintF("\nA wrong size of the mesh hides in E and cannot be seen: %s.\n",
+               SizeCaution(options));
 }
 
 /// Writes what the matched modes leave of the first strike, and returns its shares of the energy.
@@ -394,9 +428,13 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
   // What each mode radiates is known once the speed of sound is.
   for (size_t b = 0; b < sources.size(); ++b) {
     sources[b].body.radiation = RadiationOf(models[b], std::sqrt(fit.young_over_density));
+    if (sources[b].body.radiation.empty()) {
+      sources[b].no_air = WhyNoAir(models[b], sources[b].body.name);
+    }
   }
   ASSIGN_OR_RETURN(fit, fitted());
-  if (!options.out.empty()) RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources)));
+  if (!options.out.empty())
+    RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources, options)));
   std::vector<fit::ResidualShare> rest;
   if (!options.residual.empty() && !sources[0].extracted.rings.empty()) {
     ASSIGN_OR_RETURN(rest, WriteResidual(options.residual, sources[0], fit));
@@ -409,7 +447,7 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
     }
     absl::PrintF("%s\n", found.dump());
   } else {
-    PrintFit(fit, sources);
+    PrintFit(fit, sources, options);
   }
   return absl::OkStatus();
 }

@@ -79,6 +79,15 @@ TEST(FitMaterial, RefusesWithoutMassAndDensity) {
   EXPECT_THAT(FitMaterial({Body(12)}, {}).status().ToString(), HasSubstr("INVALID_MATERIAL"));
 }
 
+TEST(FitMaterial, RefusesAMassInGramsAndADensityInGramsPerCubicCentimetre) {
+  FittedBody body = Body(12);
+  body.volume_m3 = 1e-4;
+  EXPECT_TRUE(FitMaterial({body}, {.mass_kg = 0.25}).ok());
+  EXPECT_THAT(FitMaterial({body}, {.mass_kg = 250}).status().ToString(), HasSubstr("2.5e+06"));
+  EXPECT_THAT(FitMaterial({body}, {.density_kg_per_m3 = 2.5}).status().ToString(),
+              HasSubstr("INVALID_MATERIAL"));
+}
+
 TEST(FitMaterial, RefusesFewLinesAndThoseOfAnotherBody) {
   const FitSettings settings{.density_kg_per_m3 = kDensity};
   EXPECT_THAT(FitMaterial({Body(4)}, settings).status().ToString(), HasSubstr("TOO_FEW_MODES"));
@@ -115,6 +124,13 @@ TEST(CheckModes, TellsANoisyRecordingFromASoftBlow) {
   EXPECT_THAT(CheckModes(noisy, {}).ToString(), HasSubstr("RECORDING_TOO_NOISY"));
   const std::vector<Ring> soft = FindRings({Struck({{500, 5, 0.3}}, 1e-4)});
   EXPECT_THAT(CheckModes(soft, {}).ToString(), HasSubstr("TOO_FEW_MODES"));
+}
+
+TEST(CheckModes, TellsASilentOrShortRecordingFromASoftBlow) {
+  EXPECT_THAT(CheckModes({}, {}).ToString(), HasSubstr("silent"));
+  const std::vector<Ring> cut = FindRings({Struck({{500, 5, 0.3}}, 1e-4, 0.1)});
+  ASSERT_EQ(cut.size(), 1U);
+  EXPECT_THAT(CheckModes(cut, {}).ToString(), HasSubstr("end 0.1 s after"));
 }
 
 }  // namespace
