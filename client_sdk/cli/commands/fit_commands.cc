@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -117,8 +118,7 @@ absl::StatusOr<v1::ModalModelSummary> ModelOf(const client::Client& daemon,
 
 v1::Material MaterialOf(const fit::MaterialFit& fit) {
   const auto rounded = [](double value, int digits) {
-    const double step = std::pow(10, std::floor(std::log10(value)) - digits + 1);
-    return std::round(value / step) * step;
+    return std::strtod(absl::StrFormat("%.*g", digits, value).c_str(), nullptr);
   };
   v1::Material material;
   material.set_young_pa(rounded(fit.young_pa, 6));
