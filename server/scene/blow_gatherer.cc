@@ -402,13 +402,15 @@ void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   if (!(impulse > kRounding * all)) return CountAsLoad(blow);
   blow.steps.clear();
   ++counts_.blow_count;
-  const std::map<uint32_t, double> at_place = MagnitudesByPlace(blow.touches);
-  double whole = 0;
-  for (const auto& [place, magnitude] : at_place) whole += magnitude;
+  double whole = 0, squares = 0;
+  for (const auto& [place, magnitude] : MagnitudesByPlace(blow.touches)) {
+    whole += magnitude;
+    squares += magnitude * magnitude;
+  }
   for (const PairTouch& touch : blow.touches) {
     const BlowShares shares{.scale = impulse / whole,
                             .of_blow = touch.magnitude / whole,
-                            .of_place = at_place.at(PlaceOf(touch)) / whole};
+                            .of_mass = squares / (whole * whole)};
     for (size_t i = 0; i < touch.part_count; ++i) {
       events_.push_back(PartOfBlow(touch, i, shares));
       events_.back().time_s = TimeOf(pair.bodies, blow, touch);
@@ -439,7 +441,7 @@ ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which,
   double longer = 1;
   Collision collision = touch.parts[which].collision;
   if (collision.reduced_mass_kg > 0) {
-    longer *= std::pow(shares.of_place, kMassPower);
+    longer *= std::pow(shares.of_mass, kMassPower);
     collision.reduced_mass_kg *= shares.of_blow;
   }
   if (touch.duration_follows_impulse) {

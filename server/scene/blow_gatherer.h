@@ -68,9 +68,9 @@ struct ForceEvent {
 /// that. Others, after a flight, need not wait.
 ///
 /// The contacts of a pair that strike in one step share the impact: where a face lands flat, all of
-/// its corners meet the floor at the same speed, and each brings a part of the mass to rest. The
-/// reduced mass of a contact is the part of the pair's that the contact has of the blow's impulse,
-/// and its speed that of the whole blow. Several contacts at one place count as one.
+/// its corners meet the floor at the same speed, and each brings a part of the mass to rest. All
+/// get the duration of a contact with that part, the mean of the places' parts of the impulse
+/// weighted by these, and with the speed of the whole blow. Contacts at one place count as one.
 ///
 /// A body that slides from one partner to the next, such as over the tiles of a floor, takes its
 /// load along. If a pair begins to touch in the step in which another pair of the same body
@@ -158,7 +158,7 @@ class BlowGatherer {
   struct BlowShares {
     double scale = 1;    ///< impulse that the blow gives the touch, over that of its strongest step
     double of_blow = 1;  ///< the part of the touch in the blow's impulse
-    double of_place = 1;  ///< the part of all touches at its place
+    double of_mass = 1;  ///< the part of the mass that a place brings to rest, by its impulse
   };
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, const BlowShares& shares);
   /// Returns the vertex nearest to a touch. Touches with the same one are at the same place.
