@@ -151,7 +151,12 @@ absl::StatusOr<Input> ReadInput(const std::string& bytes, const worker::v1::Work
                    ParseMesh(bytes, request.mesh_format(), MetresPerUnit(settings)));
   const double extent_m = ExtentOf(read.mesh);
   observer.OnExtent(UseOf(request).size * extent_m);
-  if (settings.metres_per_unit() == 0) RETURN_IF_ERROR(CheckUnit(extent_m, UseOf(request)));
+  if (settings.metres_per_unit() == 0) {
+    RETURN_IF_ERROR(CheckUnit(extent_m, UseOf(request)));
+    // Lengths of glTF are metres by its specification.
+    const bool metres = request.mesh_format() == "glb" || request.mesh_format() == "gltf";
+    if (!metres) WarnOfUnit(extent_m, UseOf(request), read.warnings);
+  }
   ASSIGN_OR_RETURN(RegionMaterials regions, MaterialsOf(request, read.names));
   const auto number = [&](std::vector<int32_t>& numbers) {
     if (settings.regions().empty()) return numbers.clear();

@@ -39,6 +39,15 @@ absl::Status CheckUnit(double extent_m, const IntendedUse& use) {
                       extent_m));
 }
 
+void WarnOfUnit(double extent_m, const IntendedUse& use, std::vector<std::string>& warnings) {
+  constexpr double kUnusualExtentM = 3;
+  if (use.size != 1 || extent_m <= kUnusualExtentM) return;
+  warnings.push_back(
+      absl::StrFormat("the body is %.4g m long, because no unit is stated and lengths then are "
+                      "metres; if they are not, give their unit, such as --unit mm",
+                      extent_m));
+}
+
 bool MayBeTooSmall(const SurfaceMesh& surface, const IntendedUse& use) {
   const double diagonal_m = Diagonal(surface.vertices);
   double volume_m3 = 0;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "absl/status/status.h"
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/modes/modal_model.h"
@@ -12,6 +15,9 @@ namespace carillon::precompute {
 /// probably forgotten: longer than 20 m and than a hundred wavelengths of the band's upper end.
 /// Errors: MESH_UNIT_UNCLEAR.
 absl::Status CheckUnit(double extent_m, const IntendedUse& use);
+
+/// Warns of a body, in a file whose unit nobody has stated, that is longer than 3 m.
+void WarnOfUnit(double extent_m, const IntendedUse& use, std::vector<std::string>& warnings);
 
 /// Returns whether a body may be too small to have a mode in the band, and is so compact that its
 /// default mesh takes long.

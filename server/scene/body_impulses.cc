@@ -72,7 +72,7 @@ ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& loca
   const uint32_t given = model.given_triangle[located.triangle];
   const SoundingMaterial& material = object.properties.material;
   ElasticBody body{.young_pa = material.young_pa,
-                   .poisson_ratio = object.properties.poisson_ratio.value_or(model.poisson_ratio),
+                   .poisson_ratio = PoissonRatioOf(model, object.properties),
                    .mass_kg = MassKg(object),
                    .curvature_per_m = object.body->curvature.At(given, point, material.size)};
   if (model.regions.empty()) return body;

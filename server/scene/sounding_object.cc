@@ -209,10 +209,10 @@ std::optional<double> CompleteTo(const ModalModel& model, const SoundingMaterial
 /// may cross each other.
 std::vector<double> EigenvaluesFor(const ModalModel& model, const ObjectProperties& properties) {
   std::vector<double> eigenvalues = model.eigenvalues;
-  if (model.poisson_slopes.empty() || !properties.poisson_ratio) return eigenvalues;
+  const double poisson_ratio = PoissonRatioOf(model, properties);
+  if (model.poisson_slopes.empty() || poisson_ratio == model.poisson_ratio) return eigenvalues;
   for (size_t m = 0; m < eigenvalues.size(); ++m) {
-    eigenvalues[m] *=
-        EigenvalueChange(model.poisson_slopes[m], model.poisson_ratio, *properties.poisson_ratio);
+    eigenvalues[m] *= EigenvalueChange(model.poisson_slopes[m], model.poisson_ratio, poisson_ratio);
   }
   return eigenvalues;
 }
@@ -253,6 +253,11 @@ double HighestHz(const std::vector<SoundingMode>& modes) {
 }
 
 }  // namespace
+
+double PoissonRatioOf(const ModalModel& model, const ObjectProperties& properties) {
+  const double stated = properties.poisson_ratio.value_or(model.poisson_ratio);
+  return ServesPoissonRatio(model.poisson_ratio, stated, false) ? model.poisson_ratio : stated;
+}
 
 absl::StatusOr<std::shared_ptr<const Transfer>> ChooseTransfer(const ModalModel& model,
                                                                const ObjectProperties& properties,

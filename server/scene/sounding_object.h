@@ -40,6 +40,10 @@ struct ObjectProperties {
   RadiationModel radiation = RadiationModel::kDefault;
 };
 
+/// Returns the Poisson's ratio with which an object sounds: the model's own, if the stated one is
+/// the same as models round it.
+double PoissonRatioOf(const ModalModel& model, const ObjectProperties& properties);
+
 /// The modes of an object, by which its surface yields to a blow.
 struct YieldingModes {
   struct Mode {

@@ -70,6 +70,14 @@ TEST_F(ProgramFindingsTest, ALargeBodyIsMadeOfMetresOnlyIfTheUnitIsStated) {
     const Json lengths = Json::parse(made.output).at("body").at("lengths_m");
     EXPECT_NEAR(lengths[0].get<double>(), 202 * std::stod(unit), 1e-6 * std::stod(unit));
   }
+  WriteBox(bar, {5, 0.5, 0.2});
+  const auto warns = [&](const std::string& unit) {
+    return Json::parse(Run(options + unit).output).at("warnings").dump().find("5.029 m long") !=
+           std::string::npos;
+  };
+  EXPECT_TRUE(warns(""));
+  std::filesystem::remove(model);
+  EXPECT_FALSE(warns(" --unit m"));
 }
 
 // Two closed boxes in a row, which share a face, and the one box that they are together.

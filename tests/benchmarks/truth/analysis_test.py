@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A synthetic recording of known modes must come back."""
 
+import math
 import unittest
 
 import numpy
