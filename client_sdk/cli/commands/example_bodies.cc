@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -161,10 +160,9 @@ ExampleFile WrittenExample(const Example& example, const std::vector<double>& si
   const ExampleBody body = example.draw();
   std::array<double, 3> scale = {1, 1, 1};
   for (size_t axis = 0; axis < size_m.size(); ++axis) {
-    const auto coordinate = [axis](const std::array<double, 3>& vertex) { return vertex[axis]; };
-    const auto [least, most] =
-        std::ranges::minmax(body.vertices | std::views::transform(coordinate));
-    scale[axis] = size_m[axis] / (most - least);
+    const auto [least, most] = std::ranges::minmax_element(
+        body.vertices, {}, [axis](const std::array<double, 3>& vertex) { return vertex[axis]; });
+    scale[axis] = size_m[axis] / ((*most)[axis] - (*least)[axis]);
   }
   std::string text = absl::StrCat("# ", example.description, "; coordinates are metres\n");
   for (const auto& [x, y, z] : body.vertices) {
