@@ -48,7 +48,7 @@ class SharpEdges {
 
   size_t axis_ = 0;          // along which the edges extend farthest
   std::vector<Edge> edges_;  // ascending by begin_m
-  double longest_m_ = 0;     // of an edge, along axis_
+  double longest_m_ = 0;     // the extent along axis_ of the edge that has the greatest
 };
 
 }  // namespace carillon

@@ -19,8 +19,8 @@ struct Example {
   std::string name;
   std::string description;
   std::string material;
-  std::array<double, 3> point_m;  ///< of the strike, on the body as it is drawn
-  std::string impulse;            ///< of the strike, N s
+  std::array<double, 3> point_m;  ///< where the strike hits the body as it is drawn
+  std::string impulse;            ///< that the strike gives the body, N s
   ExampleBody (*draw)();
 };
 
@@ -33,8 +33,8 @@ struct ExampleFile {
   std::string strike;  ///< options of `carillon strike`
 };
 
-/// Returns the surface as an OBJ file and the strike. `size_m` are the lengths along x, y and z to
-/// which the body is stretched, metres; it is empty for the body as it is drawn.
+/// Returns the surface as an OBJ file and the strike. `size_m` has the lengths along x, y and z,
+/// metres, to which the body is stretched. If `size_m` is empty, the body keeps its size.
 ExampleFile WrittenExample(const Example& example, const std::vector<double>& size_m);
 
 }  // namespace carillon::cli

@@ -117,13 +117,13 @@ absl::StatusOr<v1::ModalModelSummary> ModelOf(const client::Client& daemon,
 }
 
 v1::Material MaterialOf(const fit::MaterialFit& fit) {
-  const auto rounded = [](double value, int digits) {
-    return std::strtod(absl::StrFormat("%.*g", digits, value).c_str(), nullptr);
+  const auto rounded = [](double value) {
+    return std::strtod(absl::StrFormat("%.6g", value).c_str(), nullptr);
   };
   v1::Material material;
-  material.set_young_pa(rounded(fit.young_pa, 6));
+  material.set_young_pa(rounded(fit.young_pa));
   material.set_poisson_ratio(std::round(fit.poisson_ratio * 1e4) / 1e4);
-  material.set_density_kg_per_m3(rounded(fit.density_kg_per_m3, 6));
+  material.set_density_kg_per_m3(rounded(fit.density_kg_per_m3));
   if (fit.laws.empty()) return material;
   const fit::DampingLaw& law = fit.laws[0];
   material.set_alpha1_s(law.alpha1_s);

@@ -23,7 +23,7 @@ SPAN_S = 0.35  # the part of the recording that is compared
 MATERIAL = "structural_steel"
 # The lowest frequencies to the highest that the recording holds.
 BAND_HZ = "20:22000"
-# The fit corrects modes by their estimated error; what is heard is decomposed as exactly as its comparison needs.
+# The fit corrects the modes of a coarse model by their estimated errors; the model that is rendered is finer.
 FIT_ACCURACY, SOUND_ACCURACY = "0.5%", "0.08%"
 # The modes whose decay is compared; those below decay too slowly for a recording of 0.37 s.
 HIGH_HZ = (6879, 7020, 10947, 11306, 15350, 16719)

@@ -121,7 +121,7 @@ class TetgenParser {
   }
 
   TextLines lines_;
-  std::vector<std::string_view> words_;  // of the line that NextFigures took last
+  std::vector<std::string_view> words_;  // those of the line that NextFigures took last
   ElementFile file_;
 };
 
