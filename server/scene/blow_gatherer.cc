@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 
 #include "server/synthesis/voice/vector3.h"
@@ -29,6 +30,9 @@ constexpr double kLastingS = 0.1;
 /// A body at rest gets the acceleration of gravity, 9.81 m/s^2, and twice that in each second step.
 /// In some games gravity is twice as great as on Earth.
 constexpr double kFeebleMPerS2 = 2.5 * 9.81;
+/// A contact that has lasted is a load without a blow if its impulses exceed the load in all by at
+/// most this number of steps of the load: so much a solver's noise adds up to.
+constexpr double kSettling = 1.5;
 /// Part of the impulses of a load that rounding may leave of it.
 constexpr double kRounding = 1e-9;
 /// A contact that is lost for a shorter time than this flickers, seconds.
@@ -320,16 +324,21 @@ void BlowGatherer::Divide(Pair& pair) {
   for (const PairTouch& touch : pair.touches) impulse += touch.magnitude;
   const double force = impulse / step_s_;
   // The part of the impulse that exceeds the load, 0 to 1.
-  double share = pair.load.Next(impulse, step_s_);
+  const double share_of_new_blow = pair.load.Next(impulse, step_s_);
+  double share = share_of_new_blow;
   if (pair.blow.begun()) {
     share = force > 0 ? std::max(1 - pair.blow.load_newtons / force, 0.0) : 0;
   }
   const bool undecided = pair.blow.begun() && *time_s_ - pair.blow.begin_s >= kUndecidedS;
   double remains = 0;
   Blow& blow = pair.blow;
-  if (Flickers(blow, force)) share = 0;
+  if (Flickers(blow, force)) share = IsFeeble(pair) ? 0 : share_of_new_blow;
   if (blow.begun() && IsOver(blow, force, share * impulse, remains)) {
-    SendBlow(pair, remains);
+    if (HasLasted(blow) && ImpulseAbove(blow, remains) <= kSettling * remains * step_s_) {
+      CountAsLoad(blow);
+    } else {
+      SendBlow(pair, remains);
+    }
     share = 0;
   } else if (share > 0) {
     if (!blow.begun()) {
@@ -384,22 +393,38 @@ bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse
                           double& remains) const {
   if (blow.lost_steps > 0) return blow.lost_steps > MostLostSteps();
   if (impulse <= blow.greatest() / 4) return true;
+  if (HasLasted(blow)) {
+    remains = MeanForceOfLastHalf(blow);
+    return true;
+  }
   remains = force_newtons;
-  if (*time_s_ - blow.begin_s >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps) return true;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
   if (impulse > blow.greatest() / 2 || blow.steps.size() < steps + 1) return false;
   return force_newtons >= 0.75 * blow.steps[blow.steps.size() - steps].force;
 }
 
+bool BlowGatherer::HasLasted(const Blow& blow) const {
+  return *time_s_ - blow.begin_s >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps;
+}
+
+double BlowGatherer::MeanForceOfLastHalf(const Blow& blow) {
+  const auto last = std::span(blow.steps).last(blow.steps.size() / 2);
+  double sum = 0;
+  for (const Blow::Step& step : last) sum += step.force;
+  return sum / static_cast<double>(last.size());
+}
+
+double BlowGatherer::ImpulseAbove(const Blow& blow, double load_newtons) const {
+  const double excess = std::max(load_newtons - blow.load_newtons, 0.0) * step_s_;
+  double impulse = 0;
+  for (const Blow::Step& step : blow.steps) impulse += step.impulse - excess;
+  return impulse;
+}
+
 void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   Blow& blow = pair.blow;
-  const double excess = std::max(remains_newtons - blow.load_newtons, 0.0) * step_s_;
-  double impulse = 0, all = 0;
-  for (const Blow::Step& step : blow.steps) {
-    impulse += step.impulse - excess;
-    all += step.impulse;
-  }
-  if (!(impulse > kRounding * all)) return CountAsLoad(blow);
+  const double impulse = ImpulseAbove(blow, remains_newtons);
+  if (!(impulse > kRounding * ImpulseAbove(blow, 0))) return CountAsLoad(blow);
   blow.steps.clear();
   ++counts_.blow_count;
   double whole = 0, squares = 0;

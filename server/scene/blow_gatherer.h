@@ -65,7 +65,8 @@ struct ForceEvent {
 /// be the load of a body that rests when the simulation begins, or whose contact flickers. In the
 /// first steps of a simulation, or shortly after the last contact, such a feeble blow is not over
 /// before its contact has been lost for some steps, and is a load if the contact returns before
-/// that. Others, after a flight, need not wait.
+/// that; an impulse with which it returns that is not feeble is a blow of its own. Others, after a
+/// flight, need not wait.
 ///
 /// The contacts of a pair that strike in one step share the impact: where a face lands flat, all of
 /// its corners meet the floor at the same speed, and each brings a part of the mass to rest. All
@@ -233,6 +234,11 @@ class BlowGatherer {
   /// Returns whether the blow is over in this step, which has the given force and impulse above the
   /// load. If a load remains, `remains` is set to its force.
   bool IsOver(const Blow& blow, double force_newtons, double impulse, double& remains) const;
+  /// Returns whether a blow has lasted as long as one may: what touches then is a load.
+  bool HasLasted(const Blow& blow) const;
+  static double MeanForceOfLastHalf(const Blow& blow);
+  /// Returns the impulse of a blow above this load, N s.
+  double ImpulseAbove(const Blow& blow, double load_newtons) const;
   /// Sends a pair's blow, and ends it.
   void SendBlow(Pair& pair, double remains_newtons);
   /// Returns the time of a touch of a blow that is over in this step.

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <random>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -190,6 +191,39 @@ TEST(BlowGatherer, AContactThatFlickersDoesNotStrike) {
                        }),
               1e-6)
         << phase;
+  }
+}
+
+TEST(BlowGatherer, AStrongImpulseStrikesThoughAFeebleOneCameShortlyBefore) {
+  for (const double first : {2.6, 4.0, 10.0}) {
+    for (const double feeble : {1.2, 1.8, 2.3}) {
+      EXPECT_GT(StruckBy(30,
+                         [&](auto& gatherer, int step) {
+                           if (step == 9) TouchBy(gatherer, 3, 1, first * kWeight);
+                           if (step == 11) TouchBy(gatherer, 3, 1, feeble * kWeight);
+                           if (step == 13) TouchBy(gatherer, 3, 1, 100 * kWeight);
+                         }),
+                95 * kWeight)
+          << first << ", " << feeble;
+    }
+  }
+}
+
+TEST(BlowGatherer, TheNoiseOfALoadDoesNotAddUpToABlow) {
+  for (const int begin : {0, 60}) {
+    for (const double noise : {0.02, 0.2}) {
+      for (const uint32_t seed : {1U, 2U, 3U, 4U}) {
+        std::minstd_rand random(seed);
+        std::uniform_real_distribution<double> part(-noise, noise);
+        EXPECT_LT(StruckBy(120,
+                           [&](auto& gatherer, int step) {
+                             if (step < begin) return;
+                             TouchBy(gatherer, 3, 1, (1 + part(random)) * kWeight);
+                           }),
+                  1e-6)
+            << begin << ", " << noise << ", " << seed;
+      }
+    }
   }
 }
 
