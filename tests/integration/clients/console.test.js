@@ -193,10 +193,15 @@ async function inBrowser(work, target = address.href) {
   }
 }
 
-/** axe-core's findings about the page as it is. */
+/** axe-core's findings about the page as it is, in light and in dark colours. */
 async function accessibilityFaults(page) {
   await page.evaluate(fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8'));
-  return page.evaluate(async () => (await globalThis.axe.run()).violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`));
+  const faults = [];
+  for (const colorScheme of ['dark', 'light']) {
+    await page.emulateMedia({ colorScheme });
+    faults.push(...await page.evaluate(async () => (await globalThis.axe.run()).violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`)));
+  }
+  return faults;
 }
 
 const samplesOf = (wave) => new Float32Array(new Uint8Array(wave.subarray(44)).buffer);
@@ -274,6 +279,7 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   assert.ok(other <= 2 * lost, `${other} blocks differ, ${lost} were lost`);
 
   assert.ok(await variance(page, '.spectrum', 'spectrum.png') > 100);
+  assert.ok(await variance(page, '.spectrogram', 'spectrogram.png') > 2);  // a busy machine draws few columns
   await page.evaluate(() => { carillonConsole.view().paused = false; });
   await page.getByRole('listbox').press('ArrowDown');
   assert.equal(await page.locator('.modes [aria-selected=true]').count(), 1);
@@ -325,8 +331,14 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   await page.getByLabel('Exactly').press('Enter');
   await page.waitForFunction((lowest) => Math.abs(carillonConsole.state.modes.value[0].frequencyHz / lowest / 2 - 1) < 1e-3, modes[0]);
 
-  // The keyboard alone strikes another point.
-  const before = await page.evaluate(() => carillonConsole.state.strike.value.point);
+  // The keyboard alone strikes another point, and one of the side that was hidden.
+  await page.evaluate(() => {
+    const { services, sceneName } = carillonConsole.state;
+    void (async () => {
+      for await (const news of services.contacts.watchContacts({ scene: sceneName() })) (globalThis.blows ??= []).push(...news.blows);
+    })();
+  });
+  await page.waitForFunction(() => globalThis.blows);
   await page.locator('.body').focus();
   const places = [];
   for (const keys of ['Shift+ArrowRight', 'Shift+ArrowRight', 'Control+Shift+ArrowRight']) {
@@ -335,8 +347,23 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   }
   const [coarse, fine] = [1, 2].map((i) => Math.hypot(...places[i].map((coordinate, axis) => coordinate - places[i - 1][axis])));
   assert.ok(fine > 0.05 * coarse && fine < 0.2 * coarse, `steps of ${coarse} and ${fine} m`);
-  await page.keyboard.press('Space');
-  await page.waitForFunction((was) => carillonConsole.state.strike.value.point[0] !== was[0], before);
+  const strikeByKey = async () => {
+    const count = await page.evaluate(() => blows.length);
+    await page.keyboard.press('Space');
+    await page.waitForFunction((known) => blows.length > known, count);
+    const { at, normal, blow } = await page.evaluate(() => {
+      const { point, normal } = carillonConsole.state.strike.value, { x, y, z } = blows.at(-1).pointM;
+      return { at: point.map((coordinate) => coordinate * carillonConsole.state.size.value), normal, blow: [x, y, z] };
+    });
+    assert.ok(Math.hypot(...at.map((coordinate, axis) => coordinate - blow[axis])) < 1e-4, `${at} m is not ${blow} m`);
+    return normal;
+  };
+  const front = await strikeByKey();
+  assert.deepEqual(await page.evaluate(() => carillonConsole.state.strike.value.point), places[2]);
+  for (let turn = 0; turn < 31; turn += 1) await page.keyboard.press('ArrowRight');
+  for (let turn = 0; turn < 10; turn += 1) await page.keyboard.press('ArrowDown');
+  const back = await strikeByKey();
+  assert.ok(front.reduce((sum, part, axis) => sum + part * back[axis], 0) < 0.5, `${front} and ${back} are normals of one side`);
 
   // What the test keeps for its comparison, and the motion, have no processor left for a rendering.
   await page.evaluate(() => {
@@ -563,6 +590,7 @@ test('the models are listed with their pictures, and the space bar lets one be h
   await page.locator('.models').focus();
   await page.keyboard.press('Space');
   await page.waitForFunction(() => carillonConsole.state.row.value && carillonConsole.state.mixer.value?.activeModeCount > 0);
+  assert.ok(await variance(page, '.models img >> nth=0', 'thumbnail.png') > 100);
   await keepPicture(page, 'console_models.png');
   assert.deepEqual(await accessibilityFaults(page), []);
 }));
@@ -656,10 +684,14 @@ test('a page of one’s own needs the cookie, and none outside of its folder is 
 test('after the daemon was killed and started again, the page strikes as before', { timeout: 400000 }, () => inBrowser(async (page) => {
   await page.waitForFunction(() => carillonConsole.state.model.value && !carillonConsole.state.busy.value);
   const scene = await page.evaluate(() => carillonConsole.state.sceneName());
-  process.kill(Number(process.env.CARILLON_DAEMON_PID), 'SIGKILL');
-  await page.waitForFunction((old) => carillonConsole.state.sceneName() !== old && !carillonConsole.state.busy.value, scene);
   const box = await page.locator('.body').boundingBox();
-  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  const click = () => page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  process.kill(Number(process.env.CARILLON_DAEMON_PID), 'SIGKILL');
+  // The modes at a point that is struck now are read when the daemon is back.
+  await click();
+  await page.waitForFunction((old) => carillonConsole.state.sceneName() !== old && !carillonConsole.state.busy.value
+    && carillonConsole.state.row.value, scene);
+  await click();
   await page.waitForFunction(async () => (await carillonConsole.state.services.audio.getMixer({})).activeModeCount > 0);
   assert.equal(await page.locator('.fault').count(), 0);
 }));

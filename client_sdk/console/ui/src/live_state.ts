@@ -163,7 +163,7 @@ function browserOf(): Link {
   const name = 'This browser';
   if (!sounding.value) return { name, state: hasDevice() ? 'unknown' : 'broken', says: 'Sound here is off (the button above).' };
   const heard = heardScene.value || 'the output';
-  return { name, state: player.volumeDb ? 'well' : 'unknown', says: `plays ${heard}; ${gapsOf(player.underruns)}, ${player.lostFrames} frames lost` };
+  return { name, state: player.volumeDb ? 'well' : 'unknown', says: `plays ${heard}; ${gapsOf(player.gaps)}, ${player.lostFrames} frames lost` };
 }
 
 /** Asks again and again while `active` holds; a daemon that is away is asked later. */

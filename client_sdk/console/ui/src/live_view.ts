@@ -40,11 +40,10 @@ export class LiveView {
   private dirty = true;
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly surfaceOf: SurfaceOf) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: true, preserveDrawingBuffer: true });
     this.budget = new DrawBudget(this.renderer);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
-    this.scene.background = new THREE.Color(0xf4f4f0);
     const sun = new THREE.DirectionalLight(0xffffff, 1.6);
     this.camera.add(sun);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x777788, 2), this.camera, this.dots, this.listener);

@@ -24,7 +24,7 @@ function Header() {
   return <header><h1>Carillon</h1>
     <nav aria-label="Views">{Object.entries(TABS).map(([name, title]) => <a href={`#${name}`} aria-current={tab.value === name ? 'page' : undefined}>{title}</a>)}</nav>
     <span>{mixer ? `${hasDevice() ? mixer.device : `${mixer.device} (no loudspeaker)`}, load ${(100 * mixer.load).toFixed(1)} %, ${mixer.activeModeCount} modes ring, ${level}` : 'no daemon'}</span>
-    <span>{sounding.value && player.underruns ? gapsOf(player.underruns) : ''}</span>
+    <span>{sounding.value && player.gaps ? gapsOf(player.gaps) : ''}</span>
     <label class="volume">Volume here <input type="range" min="0" max="60" step="1" value={player.volumeDb}
       onInput={(event) => { player.volumeDb = Number(event.currentTarget.value); }} /></label>
     <button class="sound" aria-pressed={sounding.value} title={hasDevice() ? 'The daemon sounds on its own device' : ''} onClick={() => void toggleSound()}>

@@ -38,7 +38,7 @@ function Row({ model, index, audition }: { model: ModalModelSummary; index: numb
     return () => seen.disconnect();
   }, [keyOf(model)]);
   const drawn = pictures.value.get(keyOf(model));
-  const change = (what: string, work: () => Promise<unknown>) => () => void state.attempt(what, work).then(state.listModels);
+  const change = (work: () => Promise<unknown>) => () => void state.attempt('', () => work().then(state.listModels));
   return <tr ref={row} id={`model-${index}`} aria-selected={pointed.value === index} onClick={() => { pointed.value = index; }}>
     <td>{drawn?.picture && <img src={drawn.picture} alt="" width="64" height="48" />}</td>
     <td><strong>{state.nameOf(model)}</strong><br /><small>{model.tags.join(' ')}</small></td>
@@ -46,9 +46,9 @@ function Row({ model, index, audition }: { model: ModalModelSummary; index: numb
     <td>{(Number(model.storedBytes) / 1e6).toFixed(1)} MB</td><td>{madeAt(model)}</td>
     <td><button onClick={() => audition(model)}>Hear</button>{' '}
       <button onClick={() => { void state.openModel(model.name); location.hash = '#strike'; }}>Open</button>{' '}
-      <button aria-pressed={model.pinned} onClick={change('', () => state.services.models.updateModalModel({ name: model.name, pinned: !model.pinned }))}>
+      <button aria-pressed={model.pinned} onClick={change(() => state.services.models.updateModalModel({ name: model.name, pinned: !model.pinned }))}>
         {model.pinned ? 'Unpin' : 'Pin'}</button>{' '}
-      <button disabled={model.pinned} onClick={() => { if (confirm(`Delete ${state.nameOf(model)} of ${madeAt(model)} UTC?`)) change('', () => state.services.models.deleteModalModel({ name: model.name }))(); }}>Delete</button></td></tr>;
+      <button disabled={model.pinned} onClick={() => { if (confirm(`Delete ${state.nameOf(model)} of ${madeAt(model)} UTC?`)) change(() => state.services.models.deleteModalModel({ name: model.name }))(); }}>Delete</button></td></tr>;
 }
 
 const SAYS: Partial<Record<JobState, string>> = { [JobState.QUEUED]: 'waits', [JobState.RUNNING]: 'runs', [JobState.SUCCEEDED]: 'done',

@@ -7,8 +7,9 @@ export class Player {
   context?: AudioContext;
   analyser?: AnalyserNode;
   node?: AudioWorkletNode;
+  /** How often the ring was empty. */
   underruns = 0;
-  /** The frames that wait to be played, on average; what jitters more than they last is a gap. */
+  /** The frames that still wait when the browser has taken some; what is later than they last is a gap. */
   target = 0;
   lostFrames = 0;
   /** Gets what the audio thread plays, once it is told { tap: true }; for tests and for pages that record. */
@@ -38,6 +39,13 @@ export class Player {
     };
     worker.postMessage({ scene });
     return ready;
+  }
+
+  /** How often nothing was played that should have been: because the ring was empty, or because the browser was late itself. */
+  get gaps(): number {
+    // Chromium counts the latter; TypeScript does not know it yet.
+    const context: Partial<AudioContext & { playbackStats: { underrunEvents: number } }> = this.context ?? {};
+    return this.underruns + (context.playbackStats?.underrunEvents ?? 0);
   }
 
   /** The time of the mixer's frame that the audio thread plays now, s, as blows have it. */
@@ -75,7 +83,8 @@ export class Player {
       this.connect(context, format.channels);
     }
     this.ring = new Ring(format.memory, format.channels);
-    this.node!.port.postMessage({ memory: format.memory, channels: format.channels });
+    const burst = Math.round(this.context.baseLatency * this.context.sampleRate);
+    this.node!.port.postMessage({ memory: format.memory, channels: format.channels, burst });
     await this.context!.resume();
   }
 

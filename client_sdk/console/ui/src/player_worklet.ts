@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Plays the ring. The daemon's clock and the sound card's differ by some 100 ppm, so the reader moves at a ratio near 1
-// that keeps the ring as full as its target, through a windowed sinc.
-import { Ring } from './ring';
+// Plays the ring. The browser takes several quanta at once, as many as its own buffer holds; the target is what the ring
+// still holds then, and thus how late the next block of the daemon may be. The daemon's clock and the sound card's differ
+// by some 100 ppm, so the reader moves at a ratio near 1 that keeps the target, through a windowed sinc.
+import { Ring, RING_FRAMES } from './ring';
 
 declare const sampleRate: number;
 declare const currentFrame: number;
 declare const registerProcessor: (name: string, processor: unknown) => void;
 declare class AudioWorkletProcessor { readonly port: MessagePort; }
 
-const TAPS = 32, PHASES = 512;
+const TAPS = 32, PHASES = 512, QUANTUM = 128;
 const FIRST_TARGET = 512, LEAST_TARGET = 512, MORE = 256;
 /** What the machine kept from running once, it soon keeps from running again. */
 const CALM_S = 10;
@@ -36,6 +37,8 @@ function sincTable(): Float32Array {
 
 class Player extends AudioWorkletProcessor {
   private ring?: Ring;
+  /** The frames that the browser takes at once. */
+  private burst = QUANTUM;
   private readonly table = sincTable();
   private target = FIRST_TARGET;
   private fraction = 0;
@@ -50,9 +53,10 @@ class Player extends AudioWorkletProcessor {
   constructor() {
     super();
     this.port.onmessage = (event) => {
-      const { memory, channels, adapt, tap } = event.data;
+      const { memory, channels, burst, adapt, tap } = event.data;
       if (memory) {
         this.ring = new Ring(memory, channels);
+        this.burst = burst;
         this.playing = false;
       }
       if (adapt !== undefined) {
@@ -69,18 +73,22 @@ class Player extends AudioWorkletProcessor {
     const ring = this.ring;
     if (!ring) return true;
     let fill = ring.fill();
+    // Before a quantum the ring holds on average what is due before the middle one of those that are taken at once.
+    const wanted = this.target + (this.burst + QUANTUM) / 2;
     if (!this.playing) {
-      if (fill < this.target + TAPS) return true;
+      if (fill < this.target + this.burst) return true;
+      ring.release(fill - this.target - this.burst);
+      fill = this.target + this.burst;
       this.playing = true;
-      this.smoothed = fill;
+      this.smoothed = wanted;
       this.port.postMessage({ playing: true, target: this.target });
     }
-    if (fill > this.target + MOST_EXCESS) {
-      ring.release(fill - this.target);
-      fill = this.smoothed = this.target;
+    if (fill > wanted + MOST_EXCESS) {
+      ring.release(fill - wanted);
+      fill = this.smoothed = wanted;
     }
     this.smoothed += SMOOTHING * (fill - this.smoothed);
-    const change = GAIN * (this.smoothed - this.target);
+    const change = GAIN * (this.smoothed - wanted);
     const ratio = this.adapt ? 1 + Math.max(-MOST_RATIO_CHANGE, Math.min(MOST_RATIO_CHANGE, change)) : 1;
     if (fill < frames * ratio + TAPS + 1) return this.underrun(output);
     this.read(ring, output, ratio);
@@ -90,16 +98,17 @@ class Player extends AudioWorkletProcessor {
   }
 
   private read(ring: Ring, output: Float32Array[], ratio: number): void {
-    const frames = output[0]!.length;
+    const frames = output[0]!.length, { samples, channels } = ring, { table } = this;
+    const mask = RING_FRAMES - 1, tail = ring.read() & mask;
     let place = this.fraction;
     for (let i = 0; i < frames; i += 1) {
-      const whole = Math.floor(place);
+      const whole = Math.floor(place), first = tail + whole;
       const row = Math.round((place - whole) * PHASES) * TAPS;
       for (let channel = 0; channel < output.length; channel += 1) {
         let sum = 0;
-        const source = Math.min(channel, ring.channels - 1);
-        if (ratio === 1 && row === 0) sum = ring.at(whole + TAPS / 2 - 1, source);
-        else for (let tap = 0; tap < TAPS; tap += 1) sum += this.table[row + tap]! * ring.at(whole + tap, source);
+        const source = Math.min(channel, channels - 1);
+        if (ratio === 1 && row === 0) sum = samples[((first + TAPS / 2 - 1) & mask) * channels + source]!;
+        else for (let tap = 0; tap < TAPS; tap += 1) sum += table[row + tap]! * samples[((first + tap) & mask) * channels + source]!;
         output[channel]![i] = sum;
       }
       place += ratio;

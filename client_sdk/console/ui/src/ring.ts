@@ -38,12 +38,6 @@ export class Ring {
     return samples.length / this.channels - frames;
   }
 
-  /** The sample `frame` frames after the tail. */
-  at(frame: number, channel: number): number {
-    const place = (Atomics.load(this.places, TAIL) + frame) & (RING_FRAMES - 1);
-    return this.samples[place * this.channels + channel]!;
-  }
-
   /** Lets go of frames that have been read. */
   release(frames: number): void {
     Atomics.store(this.places, TAIL, (Atomics.load(this.places, TAIL) + frames) | 0);

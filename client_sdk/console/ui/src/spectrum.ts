@@ -17,7 +17,7 @@ export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], k
   const topDb = Math.ceil(Math.max(40, ...modes.map((mode) => 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9))) / 10) * 10;
   const bottom = height - MARGIN.bottom;
   const y = (db: number) => MARGIN.top + (bottom - MARGIN.top) * (topDb - db) / SPAN_DB;
-  drawAxes(pen, x, y, topDb, width, bottom);
+  drawAxes(pen, getComputedStyle(canvas).color, x, y, topDb, width, bottom);
   pen.beginPath();
   pen.rect(MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, bottom - MARGIN.top);
   pen.clip();
@@ -25,9 +25,11 @@ export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], k
   for (const mode of kept) {
     line(pen, x(mode.frequencyHz), bottom, x(mode.frequencyHz), y(Math.max(topDb - SPAN_DB, 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9))));
   }
-  for (const mode of modes) {
+  // The chosen one lies above the others, and many let each other be seen.
+  for (const mode of [...modes.filter(({ index }) => index !== chosen), ...modes.filter(({ index }) => index === chosen)]) {
+    pen.globalAlpha = modes.length > 200 && mode.index !== chosen ? 0.3 : 1;
     const db = Math.max(topDb - SPAN_DB, 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9));
-    pen.strokeStyle = mode.index === chosen ? '#d43d00' : '#1d4f91';
+    pen.strokeStyle = mode.index === chosen ? '#d43d00' : '#3b7dd8';
     pen.lineWidth = mode.index === chosen ? 3 : 1.5;
     line(pen, x(mode.frequencyHz), bottom, x(mode.frequencyHz), y(db));
     pen.lineWidth = 1;
@@ -35,11 +37,11 @@ export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], k
   }
 }
 
-function drawAxes(pen: CanvasRenderingContext2D, x: (hz: number) => number, y: (db: number) => number, topDb: number,
+function drawAxes(pen: CanvasRenderingContext2D, ink: string, x: (hz: number) => number, y: (db: number) => number, topDb: number,
     width: number, bottom: number): void {
   pen.font = '11px system-ui';
-  pen.fillStyle = '#333';
-  pen.strokeStyle = '#ddd';
+  pen.fillStyle = ink;
+  pen.strokeStyle = '#8884';
   pen.lineWidth = 1;
   pen.textAlign = 'center';
   for (const hz of [20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000]) {
@@ -85,7 +87,8 @@ export class Spectrogram {
     const step = () => {
       if (this.ended) return;
       this.advance();
-      requestAnimationFrame(step);
+      // Half of the screen's frames are enough for columns of 85 ms, and leave the processor to the sound.
+      requestAnimationFrame(() => requestAnimationFrame(step));
     };
     requestAnimationFrame(step);
   }

@@ -161,13 +161,16 @@ export const sceneName = () => scene;
 
 const faultOf = (error: unknown): Fault => errorInfo(error) ?? { message: ConnectError.from(error).rawMessage };
 
+/** Says why a call failed. */
+export const showFault = (error: unknown): void => { fault.value = faultOf(error); };
+
 export async function attempt<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
   busy.value = what;
   fault.value = undefined;
   try {
     return await work();
   } catch (error) {
-    fault.value = faultOf(error);
+    showFault(error);
     return undefined;
   } finally {
     busy.value = '';
@@ -187,6 +190,8 @@ async function begin(): Promise<void> {
       strikes = new StrikeStream(services, scene, (message) => { fault.value = { message }; }, () => void begin());
       if (model.value) await addObject(model.value);
       else if (models.value[0] && !upload.value) await openModel(models.value[0].name);
+      // The daemon may have gone between a strike and its answer.
+      if (strike.value && !row.value) await readRow(strike.value);
       return true;
     });
     if (done) break;
@@ -304,7 +309,7 @@ export function sendStrike(at: Strike): void {
 
 export async function readRow(at: Strike): Promise<Float32Array | undefined> {
   const of = model.value;
-  const read = await of?.shapes.at(at.vertex);
+  const read = await of?.shapes.at(at.vertex).catch(showFault) ?? undefined;
   if (strike.value !== at || model.value !== of) return undefined;
   return row.value = read;
 }

@@ -47,7 +47,7 @@ async function strikeAndShow(at: Strike): Promise<void> {
   view?.mark(at);
   const row = await state.readRow(at);
   // A mode that was chosen stays in sight, so that its nodal lines can be struck.
-  if (row && state.chosenMode.value === undefined) await view?.showStrike(at, row, state.modes.value);
+  if (row && state.chosenMode.value === undefined) await view?.showStrike(at, row, state.modes.value).catch(state.showFault);
 }
 
 export function strikeAgain(): void {
@@ -92,6 +92,7 @@ function Spectrum() {
   useEffect(() => {
     const draw = () => drawSpectrum(canvas.current!, state.modes.value, state.keptModes.value, state.chosenMode.value);
     new ResizeObserver(draw).observe(canvas.current!);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
     return effect(draw);
   }, []);
   const choose = (event: MouseEvent) => {
@@ -106,12 +107,12 @@ function Spectrum() {
 function chooseMode(index: number) {
   if (state.chosenMode.value === index) {
     state.chosenMode.value = undefined;
-    if (state.strike.value && state.row.value) void view?.showStrike(state.strike.value, state.row.value, state.modes.value);
+    if (state.strike.value && state.row.value) void view?.showStrike(state.strike.value, state.row.value, state.modes.value).catch(state.showFault);
     return;
   }
   state.chosenMode.value = index;
   const mode = state.modes.value.find((one) => one.index === index);
-  if (mode) void view?.showMode(mode);
+  if (mode) void view?.showMode(mode).catch(state.showFault);
 }
 
 /** How far a mode is below the loudest at the point, dB. */
@@ -137,8 +138,15 @@ function Modes() {
     const db = levelHere(mode, loudest);
     return db < -99 ? '< −99' : `${db.toFixed(0)} dB`.replace('-', '−');
   };
+  /** What is said of the modes that the column calls `word`, with their numbers. */
+  const missing = (word: string, says: string) => {
+    const numbers = state.modes.value.filter((mode) => here(mode) === word).map((mode) => mode.index + 1);
+    return numbers.length ? `${says}: ${numbers.slice(0, 8).join(', ')}${numbers.length > 8 ? ` and ${numbers.length - 8} more` : ''}. ` : '';
+  };
+  const missingHere = missing('silent', 'Missing at this point, where they have a node') + missing('across', 'Moving across the blow');
   const seconds = (s: number) => (s < 10 ? s.toPrecision(2) : s.toFixed(0));
   return <section class="modes"><h2 id="modes">Modes {state.coarse.value ? (state.job.value ? '(coarse, finer ones follow)' : '(coarse)') : ''}</h2><Radiation />
+    {state.row.value && <p class="hint">{missingHere || 'No mode is missing at this point.'}</p>}
     <p class="columns" aria-hidden="true"><span>#</span><span>Hz</span><span>note</span><span title="how far the true frequency may lie below">low %</span><span>T60 s</span>
       <span title="below the loudest; silent: a node; across: the point moves across the blow">here</span></p>
     <ul role="listbox" aria-labelledby="modes" tabIndex={0} onKeyDown={keys}
@@ -295,7 +303,7 @@ function News() {
     {job && <p><progress aria-label="Progress" value={progress?.fraction ?? 0} /> {progress?.phase ? Phase[progress.phase]!.toLowerCase() : job.wait?.runningJobLabel ? `waiting for ${job.wait.runningJobLabel}` : 'waiting'}
       {progress?.remainingS ? `, ${Math.ceil(progress.remainingS)} s left` : ''}
       {progress?.convergedModeCount ? `, ${progress.convergedModeCount} modes` : ''}{state.coarse.value ? '; strike the coarse body now' : ''}
-      {' '}<button onClick={() => void state.services.jobs.cancelJob({ name: job.name })}>Cancel</button></p>}
+      {' '}<button onClick={() => void state.services.jobs.cancelJob({ name: job.name }).catch(state.showFault)}>Cancel</button></p>}
     {!job && state.busy.value && <p>{state.busy.value} …</p>}
     {state.fault.value && <p class="fault" role="alert">{state.fault.value.message}</p>}
     {upload?.refusal && <Refusal upload={upload} />}

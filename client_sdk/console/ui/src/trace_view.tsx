@@ -40,13 +40,14 @@ function drawLine(canvas: HTMLCanvasElement, one: trace.Trace, timeS: number): v
   const pen = canvas.getContext('2d')!;
   pen.scale(devicePixelRatio, devicePixelRatio);
   const x = (time: number) => LEFT + (width - LEFT) * time / one.sound.duration;
-  pen.fillStyle = '#1d4f91';
+  pen.fillStyle = '#3b7dd8';
   const columns = columnsOf(one, Math.max(1, width - LEFT));
   columns.forEach((share, column) => pen.fillRect(LEFT + column, WAVE_HEIGHT / 2 * (1 - share), 1, Math.max(WAVE_HEIGHT * share, 0.5)));
   pen.font = '12px system-ui';
+  const ink = getComputedStyle(canvas).color;
   one.objects.forEach(({ handle }, row) => {
     const y = WAVE_HEIGHT + ROW_HEIGHT * (row + 0.5);
-    pen.fillStyle = '#1a1a1a';
+    pen.fillStyle = ink;
     pen.fillText(one.labels.get(handle)!.slice(0, 16), 4, y + 4);
     pen.fillStyle = `#${COLORS[handle % COLORS.length]!.toString(16).padStart(6, '0')}`;
     for (const blow of one.blows) {
@@ -56,7 +57,7 @@ function drawLine(canvas: HTMLCanvasElement, one: trace.Trace, timeS: number): v
       pen.fill();
     }
   });
-  pen.fillStyle = '#a01500';
+  pen.fillStyle = '#d43d00';
   pen.fillRect(x(timeS), 0, 1.5, height);
 }
 
