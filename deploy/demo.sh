@@ -11,5 +11,6 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # A build folder that has the tests keeps them; a new one needs none, nor their packages.
 options=()
 if [[ ! -f $root/build/release/CMakeCache.txt ]]; then options=(-DCARILLON_TESTS=OFF -DCARILLON_BENCHMARKS=OFF); fi
-"$root/deploy/build.sh" release "${options[@]}" carillond carillon-precompute carillon carillon-wind-chimes
+"$root/deploy/build.sh" release "${options[@]}" \
+  carillond carillon-precompute carillon carillon-wind-chimes carillon_python
 exec "$root/deploy/demo/wind_chimes.sh" "$@"
