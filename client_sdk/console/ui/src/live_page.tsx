@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { effect } from '@preact/signals';
 import { newtonSeconds, strikerOf } from './blow_text';
-import { LiveView, MOST_DOTS } from './live_view';
+import { colorOf, LiveView, MOST_DOTS } from './live_view';
 import * as live from './live_state';
 import { fetchSurface } from './modal_model';
 import { hear, heardScene } from './sounding';
@@ -76,7 +76,7 @@ function Origin() {
 function Blows() {
   return <section class="blows"><h2>Newest blows</h2><Origin /><table><thead><tr><th title="on the clock of the daemon’s sound">at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
     <tbody>{live.blows.value.slice(0, 12).map((seen) => [seen, seen.blow] as const).map(([seen, blow]) => <tr>
-      <td><button class="inline" onClick={() => { live.chosen.value = seen; }}>{blow.timeS.toFixed(3)}</button></td><td>{bodyName(blow.object)}</td>
+      <td><button class="inline" onClick={() => { live.chosen.value = seen; }}>{blow.timeS.toFixed(3)}</button></td><td><i class="dot" style={{ background: colorOf(blow.object) }} /> {bodyName(blow.object)}</td>
       <td>{strikerOf(blow, bodyName)}</td>
       <td>{newtonSeconds(blow).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
 }

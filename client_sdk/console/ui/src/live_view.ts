@@ -9,7 +9,9 @@ import type { SeenBlow } from './live_state';
 import type { Surface } from './modal_model';
 
 /** Colours that the colour-blind tell apart (Okabe and Ito). */
-export const COLORS = [0x0072b2, 0xe69f00, 0x009e73, 0xcc79a7, 0x56b4e9, 0xd55e00, 0xf0e442, 0x999999];
+const COLORS = [0x0072b2, 0xe69f00, 0x009e73, 0xcc79a7, 0x56b4e9, 0xd55e00, 0xf0e442, 0x999999];
+/** The colour of the body of a handle, as CSS has it. */
+export const colorOf = (handle: number) => `#${COLORS[handle % COLORS.length]!.toString(16).padStart(6, '0')}`;
 const BLOW_MS = 700;
 const GLOW_MS = 250;
 export const MOST_DOTS = 24;

@@ -4,7 +4,7 @@ import type { ComponentChildren } from 'preact';
 import { useEffect, useRef } from 'preact/hooks';
 import { effect } from '@preact/signals';
 import { newtonSeconds, strikerOf } from './blow_text';
-import { COLORS, LiveView } from './live_view';
+import { colorOf, LiveView } from './live_view';
 import type { SurfaceOf } from './live_view';
 import * as trace from './trace_state';
 
@@ -49,7 +49,7 @@ function drawLine(canvas: HTMLCanvasElement, one: trace.Trace, timeS: number): v
     const y = WAVE_HEIGHT + ROW_HEIGHT * (row + 0.5);
     pen.fillStyle = ink;
     pen.fillText(one.labels.get(handle)!.slice(0, 16), 4, y + 4);
-    pen.fillStyle = `#${COLORS[handle % COLORS.length]!.toString(16).padStart(6, '0')}`;
+    pen.fillStyle = colorOf(handle);
     for (const blow of one.blows) {
       if (blow.object !== handle) continue;
       pen.beginPath();
@@ -78,7 +78,12 @@ function columnsOf(one: trace.Trace, count: number): Float32Array {
 
 function Line() {
   const canvas = useRef<HTMLCanvasElement>(null);
-  useEffect(() => effect(() => { if (trace.trace.value) drawLine(canvas.current!, trace.trace.value, trace.timeS.value); }), []);
+  useEffect(() => {
+    const draw = () => { if (trace.trace.value) drawLine(canvas.current!, trace.trace.value, trace.timeS.value); };
+    new ResizeObserver(draw).observe(canvas.current!);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
+    return effect(draw);
+  }, []);
   const durationS = trace.trace.value?.sound.duration ?? 0;
   const keys = (event: KeyboardEvent) => {
     const step = { ArrowLeft: -STEP_S, ArrowRight: STEP_S }[event.key];
@@ -101,7 +106,7 @@ function Blows() {
   const name = (handle: number) => one!.labels.get(handle) ?? `body ${handle}`;
   return <section class="blows"><h2>Blows about the playhead</h2><table><thead><tr><th>at s</th><th>body</th><th>by</th><th>N s</th><th>ms</th></tr></thead>
     <tbody>{near.map((blow) => <tr><td><button class="inline" onClick={() => trace.seek(blow.timeS)}>{blow.timeS.toFixed(3)}</button></td>
-      <td>{name(blow.object)}</td><td>{strikerOf(blow, name)}</td>
+      <td><i class="dot" style={{ background: colorOf(blow.object) }} /> {name(blow.object)}</td><td>{strikerOf(blow, name)}</td>
       <td>{newtonSeconds(blow).toPrecision(2)}</td><td>{(1000 * blow.durationS).toFixed(2)}</td></tr>)}</tbody></table></section>;
 }
 
