@@ -19,7 +19,7 @@ const { Scene } = require('./scenes');
 const { toSettings } = require('./settings');
 const { Sound, samplesOf, samplesOfIntegers } = require('./sound');
 const { Trace } = require('./traces');
-const { warnOfContacts, warnOfLabel, warnOfTransfers } = require('./warnings');
+const { warnOfContacts, warnOfLabel, warnOfOneChannel, warnOfTransfers } = require('./warnings');
 
 const JOB_STATES = ['queued', 'running', 'succeeded', 'failed', 'cancelled'];
 
@@ -67,6 +67,7 @@ class Client {
     this.options = channelOptions(server, options);
     this.stubs = new Map();
     this.openCalls = new Set();
+    this.soundedModels = new Set(); // for which it was asked whether their transfer is being computed
   }
 
   /** The client of a service of the contract that grpc-js makes, for calls that have no method here. */
@@ -255,7 +256,8 @@ class Client {
 
   /**
    * Makes an empty scene. It ends by itself a minute after its clients, unless `keep` is true. With an `id`, a scene that
-   * you made before with this id and the same settings is returned as it is, and its `existing` is true.
+   * you made before with this id and the same settings is returned as it is, and its `existing` is true. A HearingWarning
+   * tells of a `hearing` with panning or two ears whose daemon plays one channel.
    */
   async createScene(settings = {}) {
     refuseUnknown(settings, ['hearing', 'listener', 'gain', 'keep', 'id'], 'createScene', 'CreateSceneRequest');
@@ -265,7 +267,17 @@ class Client {
     const request = { ...given('hearing', hearing), ...given('listener', toPose(listener, 'listener')),
       ...given('gain', gain), keep, ...given('id', id) };
     const made = await this.call('SceneService', 'CreateScene', request);
+    if (hearing?.panning || hearing?.binaural) await this.warnOfOneChannel(made.name);
     return new Scene(this, made.name, made.existing);
+  }
+
+  /** Warns if the daemon plays one channel. A caller who may not ask for its output gets no warning. */
+  async warnOfOneChannel(scene) {
+    try {
+      if ((await this.status()).format.channelCount === 1) warnOfOneChannel(scene);
+    } catch (error) {
+      if (!(error instanceof CarillonError)) throw error;
+    }
   }
 
   /** Returns all scenes of the daemon, the oldest first. */
@@ -317,12 +329,18 @@ class Client {
     const empty = summary.warnings.find(({ id }) => id === 'TRACE_EMPTY');
     if (empty) throw new CarillonError(empty.id, empty.text);
     warnOfContacts(summary.warnings);
-    if (summary.paperCouplingObjectCount) await this.warnOfTransfers(whole.objects.map((object) => object.modalModel));
+    if (summary.paperCouplingObjectCount) {
+      await this.warnOfTransfers(whole.objects.map((object) => object.modalModel), "the sound is by the paper's coupling, " +
+        'and the same rendering will sound different later');
+    }
     return new Sound(samplesOf(pieces), format.sampleRateHz, format.channelCount, summary, blows);
   }
 
-  /** Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning. */
-  async warnOfTransfers(models) {
+  /**
+   * Warns if transfers of the models are being computed, and says how the objects sound meanwhile. A caller who may not
+   * list jobs gets no warning.
+   */
+  async warnOfTransfers(models, meanwhile) {
     const labels = [];
     try {
       for await (const job of this.jobs({ states: ['queued', 'running'] })) {
@@ -331,7 +349,7 @@ class Client {
     } catch (error) {
       if (!(error instanceof CarillonError)) throw error;
     }
-    if (labels.length) warnOfTransfers(labels);
+    if (labels.length) warnOfTransfers(labels, meanwhile);
   }
 
   /**

@@ -23,8 +23,9 @@ const { CarillonError } = require('./errors');
  */
 
 /**
- * The other body of a contact, if it is an object, too.
- * @typedef {{ object: ObjectLike, point: Vector, rotation?: Rotation }} Second
+ * The other body of a contact, if it is an object, too; the point is in that object's own frame. In a stream with frame
+ * 'scene' it is in the scene's, and by default that of the contact.
+ * @typedef {{ object: ObjectLike, point?: Vector, rotation?: Rotation }} Second
  */
 
 /**
@@ -44,7 +45,8 @@ const { CarillonError } = require('./errors');
  */
 
 /**
- * What all contacts have as columns. One object, or one number, stands for all rows.
+ * What all contacts have as columns. One object, or one number, stands for all rows. `secondPoints` are in the frame of
+ * each second object; in a stream with frame 'scene' they are in the scene's, and by default the points.
  * @typedef {{ objects: Objects, points: Table, secondObjects?: Objects, secondPoints?: Table, secondRotations?: Table }}
  *   ContactPlaces
  */
@@ -79,7 +81,7 @@ const MEANINGS = {
   points: `metres ${STREAM_FRAME}`,
   impulses: `newton seconds ${STREAM_FRAME}`,
   forces: `newtons ${STREAM_FRAME}`,
-  secondPoints: `metres ${STREAM_FRAME}`,
+  secondPoints: "metres in the second object's own frame, or in the scene's in a stream with frame: 'scene'",
   secondRotations: `${ROTATION} from the first object's frame into the second's`,
   positions: "metres in the scene's frame",
   orientations: `${ROTATION} from the object's frame into the scene's`,
@@ -93,6 +95,8 @@ const DURATION = 'zero seconds or more, or NaN, which leaves it to the daemon';
 const STEP_KEYS = ['contacts', 'impacts', 'forces', 'poses', 'listener', 'timeScale'];
 const COLLISION = ['duration', 'timeOffset', 'striker'];
 const COLLISIONS = ['durations', 'timeOffsets', 'striker'];
+/** The Frame in which points and impulses are those of the scene. */
+const SCENE = 'FRAME_SCENE';
 const SECOND_COLUMNS = ['secondObjects', 'secondPoints', 'secondRotations'];
 const ROUGH_COLUMNS = ['travelSpeeds', 'roughnessDepth', 'irregularityLength'];
 // The kinds of contacts in a step: of each the kind in the contract, the vector of a row and of columns, the field of
@@ -209,8 +213,8 @@ function numbers(values, count, name, read = number) {
   return list;
 }
 
-/** The message of contacts given as columns; `name` is their key in the step. */
-function contactColumns(columns, name) {
+/** The message of contacts given as columns, in a Frame; `name` is their key in the step. */
+function contactColumns(columns, name, frame) {
   const { kind, vectors, field, columns: keys } = KINDS[name];
   refuseUnknown(columns, ['objects', 'points', vectors, ...SECOND_COLUMNS, ...keys], name);
   const pointM = table(columns.points, 'points');
@@ -224,7 +228,7 @@ function contactColumns(columns, name) {
   refuseNoNumbers({ roughnessDepth, irregularityLength }, name);
   return { kind, object: handles(columns.objects, count), pointM, [field]: values, ...numberColumns(columns, count),
     ...present({ roughnessDepth, irregularityLengthM: irregularityLength }),
-    ...secondColumns(columns, count), ...given('hertz', toStriker(columns.striker)) };
+    ...secondColumns(columns, pointM, frame), ...given('hertz', toStriker(columns.striker)) };
 }
 
 /** The columns of one number a contact, as far as they are given. */
@@ -242,18 +246,20 @@ function numberColumns({ durations, timeOffsets, partners, travelSpeeds }, count
   return made;
 }
 
-function secondColumns({ secondObjects, secondPoints, secondRotations }, count) {
+/** In the scene's frame one place has the same coordinates for both objects. */
+function secondColumns({ secondObjects, secondPoints, secondRotations }, pointM, frame) {
   if (secondObjects === undefined) return {};
-  return { secondObject: handles(secondObjects, count, 'secondObjects'),
-    secondPointM: table(secondPoints, 'secondPoints'),
+  return { secondObject: handles(secondObjects, pointM.length / 3, 'secondObjects'),
+    secondPointM: secondPoints === undefined && frame === SCENE ? pointM : table(secondPoints, 'secondPoints'),
     ...given('secondRotation', secondRotations && table(secondRotations, 'secondRotations', 4)) };
 }
 
-function secondObject(second, where) {
+function secondObject({ second, point }, where, frame) {
   if (!second) return second;
   refuseUnknown(second, ['object', 'point', 'rotation'], `second of ${where}`);
+  const own = second.point === undefined && frame === SCENE ? point : second.point;
   return { object: handleOf(second.object, `object of second of ${where}`),
-    pointM: vector(second.point, `point of second of ${where}`, MEANINGS.secondPoints),
+    pointM: vector(own, `point of second of ${where}`, MEANINGS.secondPoints),
     ...given('rotation', second.rotation && quaternion(second.rotation, `rotation of second of ${where}`)) };
 }
 
@@ -263,7 +269,7 @@ function toRoughness(roughness, where) {
 }
 
 /** The message of one contact; `name` is the key of the list in the step that has it. */
-function contactRow(row, name, where) {
+function contactRow(row, name, where, frame) {
   const { kind, vector: key, vectors, field, row: keys } = KINDS[name];
   refuseUnknown(row, ['object', 'point', key, 'second', ...keys], where);
   refuseNoNumbers({ timeOffset: row.timeOffset }, where);
@@ -273,7 +279,7 @@ function contactRow(row, name, where) {
   [field]: vector(row[key], `${key} of ${where}`, MEANINGS[vectors]),
   ...given('durationS', durationOf(row.duration, `duration of ${where}`)),
   ...given('roughness', toRoughness(row.roughness, where)), ...given('hertz', toStriker(row.striker)),
-  ...given('second', secondObject(row.second, where)) };
+  ...given('second', secondObject(row, where, frame)) };
 }
 
 function poseColumns(columns) {
@@ -293,10 +299,10 @@ function checkedScale(scale) {
 }
 
 /**
- * Makes the message of the step at a simulation time, seconds. Contacts, impacts and forces are rows if they are an
- * array, and columns otherwise.
+ * Makes the message of the step at a simulation time, seconds, of a stream or trace with this Frame. Contacts, impacts
+ * and forces are rows if they are an array, and columns otherwise.
  */
-function makeStep(time, own) {
+function makeStep(time, own, frame) {
   const content = own ?? {};
   if (typeof time !== 'number') refuse(time, 'time', 'the simulation time in seconds');
   refuseUnknown(content, STEP_KEYS, 'step');
@@ -304,10 +310,10 @@ function makeStep(time, own) {
   for (const name of Object.keys(KINDS)) {
     const contacts = content[name];
     if (Array.isArray(contacts)) {
-      const rows = contacts.map((row, i) => contactRow(row, name, `${name}[${i}]`));
+      const rows = contacts.map((row, i) => contactRow(row, name, `${name}[${i}]`, frame));
       step.contacts = [...step.contacts ?? [], ...rows];
     } else if (contacts) {
-      step.contactColumns = [...step.contactColumns ?? [], contactColumns(contacts, name)];
+      step.contactColumns = [...step.contactColumns ?? [], contactColumns(contacts, name, frame)];
     }
   }
   if (content.listener) step.listener = toPose(content.listener, 'listener');

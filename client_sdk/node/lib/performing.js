@@ -136,7 +136,7 @@ class Performance {
     for (const name of ['contacts', 'impacts', 'forces']) {
       if (!content[name]) continue;
       step.contacts = [...step.contacts ?? [],
-        withEnvironments(content[name], (columns) => contactColumns(columns, name))];
+        withEnvironments(content[name], (columns) => contactColumns(columns, name, this.settings.frame))];
     }
     if (content.poses) step.poses = withEnvironments(content.poses, poseColumns);
     let { samples: answer } = await this.ask({ step });

@@ -89,9 +89,26 @@ class Scene {
    * its place.
    */
   async addAll(objects) {
-    const request = { scene: this.name, objects: objects.map((object, i) => this.newObject(object, `object ${i} of addAll`)) };
-    const answer = await this.client.call('SceneService', 'AddObjects', request);
+    return this.addObjects(objects.map((object, i) => this.newObject(object, `object ${i} of addAll`)));
+  }
+
+  async addObjects(wanted) {
+    const answer = await this.client.call('SceneService', 'AddObjects', { scene: this.name, objects: wanted });
+    const models = answer.objects.filter(({ radiation }, i) => !wanted[i].radiation &&
+      radiation === 'RADIATION_MODEL_PAPER_COUPLING').map(({ modalModel }) => modalModel);
+    await this.warnOfTransfers(models);
     return answer.objects.map((object) => new SoundingObject(this, object));
+  }
+
+  /** Warns, once of each model, if the transfers that the objects lack are being computed. */
+  async warnOfTransfers(models) {
+    const { soundedModels } = this.client;
+    const unasked = models.filter((model) => !soundedModels.has(model));
+    for (const model of unasked) soundedModels.add(model);
+    if (unasked.length) {
+      await this.client.warnOfTransfers(unasked, "the objects sound by the paper's coupling, at other levels, until they " +
+        'change to it');
+    }
   }
 
   /** The part of a request that describes an object. */
@@ -105,13 +122,12 @@ class Scene {
 
   /**
    * Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with. Its gain
-   * is linear, as in SoundingObject.update.
+   * is linear, as in SoundingObject.update. A TransferWarning tells, once a model, that it is still being computed how
+   * the model radiates.
    */
   async add(model, settings = {}) {
     refuseNoObject(settings, OBJECT_KEYS, 'add');
-    const request = { scene: this.name, objects: [this.newObject({ ...settings, model }, 'add')] };
-    const answer = await this.client.call('SceneService', 'AddObjects', request);
-    return new SoundingObject(this, answer.objects[0]);
+    return (await this.addObjects([this.newObject({ ...settings, model }, 'add')]))[0];
   }
 
   /** Returns the objects of the scene by their handles. */
@@ -301,7 +317,7 @@ class ContactStream {
     for (const rows of [content?.contacts, content?.impacts, content?.forces, content?.poses]) {
       refuseOtherScenes(rows, this.start.scene);
     }
-    const made = makeStep(time, content);
+    const made = makeStep(time, content, this.start.frame);
     refuseTime(time, this.stepCount, this.time, 'open another stream for another run');
     this.stepCount += 1;
     this.time = time;

@@ -66,7 +66,7 @@ class Trace {
           'returned');
       }
     }
-    const made = makeStep(time, content);
+    const made = makeStep(time, content, this.header.frame);
     refuseTime(time, this.steps.length, this.steps.at(-1)?.timeS ?? 0, 'make another trace for another run');
     this.steps.push(made);
   }

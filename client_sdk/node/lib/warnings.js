@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-/** Warns of the jobs with these labels, whose transfers a rendering would have used. */
-function warnOfTransfers(labels) {
-  process.emitWarning(`${labels.join(', ')} ${labels.length === 1 ? 'is' : 'are'} still being computed, so that the sound is by the ` +
-    "paper's coupling, and the same rendering will sound different later; await waitForTransfer() of the model first",
-  'TransferWarning');
+/** Warns of the jobs with these labels, whose transfers the objects lack, and says how these sound meanwhile. */
+function warnOfTransfers(labels, meanwhile) {
+  process.emitWarning(`${labels.join(', ')} ${labels.length === 1 ? 'is' : 'are'} still being computed, so that ` +
+    `${meanwhile}; await waitForTransfer() of the model first`, 'TransferWarning');
 }
 
 // The daemon cuts longer labels.
@@ -19,6 +18,12 @@ function warnOfLabel(label, wanted) {
   'LabelWarning');
 }
 
+/** Warns of a scene with panning or two ears whose daemon plays one channel. */
+function warnOfOneChannel(scene) {
+  process.emitWarning(`${scene} has panning or two ears, but the daemon plays one channel, which has neither; start it by ` +
+    '`carillond --channels 2`', 'HearingWarning');
+}
+
 /** Passes on what the daemon says about contacts that are probably a mistake of the caller. */
 function warnOfContacts(warnings) {
   for (const { id, text } of warnings) process.emitWarning(`${id}: ${text}`, { type: 'ContactWarning', code: id });
@@ -30,4 +35,4 @@ function warnOfOpenStream(scene) {
     'last contacts may not have sounded; await its close()' }]);
 }
 
-module.exports = { warnOfContacts, warnOfLabel, warnOfOpenStream, warnOfTransfers };
+module.exports = { warnOfContacts, warnOfLabel, warnOfOneChannel, warnOfOpenStream, warnOfTransfers };

@@ -77,6 +77,19 @@ test('an object of another scene is refused', async () => {
   await assert.rejects(stream.close(), carillon.ServerUnavailable);
 });
 
+test('one place has the same coordinates for both objects in the frame of the scene alone', () => {
+  const columns = { objects: 1, points: [1, 2, 3], impulses: IMPULSE, secondObjects: 2 };
+  const row = { object: 1, point: [1, 2, 3], impulse: IMPULSE, second: { object: 2 } };
+  refused("secondPoints is undefined; it must be numbers, 3 a contact: metres in the second object's own frame, or in the " +
+    "scene's", { contacts: columns });
+  refused('point of second of contacts[0] is undefined', { contacts: [row] });
+  const trace = new carillon.Trace({ step: 1 / 240, frame: 'scene' });
+  trace.step(0, { contacts: columns });
+  trace.step(0, { contacts: [row] });
+  assert.deepEqual(trace.steps[0].contactColumns[0].secondPointM, [1, 2, 3]);
+  assert.deepEqual(trace.steps[1].contacts[0].second.pointM, { x: 1, y: 2, z: 3 });
+});
+
 test('what is no mesh is refused', async () => {
   for (const wrong of [5, null, {}, { vertices: [[0, 0, 0]] }]) {
     await assert.rejects(c.createModel(wrong, { material: 'oak' }),

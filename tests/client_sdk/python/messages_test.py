@@ -4,19 +4,22 @@
 
 import functools
 import inspect
+import io
 import os
 import pathlib
 import pickle
 import tempfile
 import types
 import unittest
+import warnings
 from unittest import mock
 
 import grpc
 import numpy
 
 import carillon
-from carillon.v1 import audio_service_pb2, contact_service_pb2, error_pb2, scene_service_pb2, warning_pb2
+from carillon.v1 import (
+    audio_service_pb2, contact_service_pb2, decomposition_pb2, error_pb2, scene_service_pb2, warning_pb2)
 
 POINT, IMPULSE = (0, 0, 0), (0, 0, 1)
 MESH = ([(0, 0, 0)], [(0, 0, 0)])
@@ -101,6 +104,26 @@ class RefusalsTest(MessagesTest):
             self.refused(expected, made, contacts=given)
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
         self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+
+    def test_one_place_has_the_same_coordinates_for_both_objects_in_the_frame_of_the_scene_alone(self):
+        given = carillon.Contacts(1, [(1, 2, 3)], [IMPULSE], second_objects=2)
+        self.refused("second_objects without second_points: each contact needs its place in the frame of its second "
+                     "object, too, unless the frame is \"scene\"", made, contacts=given)
+        self.refused("second_points is 'no'; it must be metres in the second object's own frame, or in the scene's",
+                     made, contacts=carillon.Contacts(1, POINT, IMPULSE, second_objects=2, second_points="no"))
+        trace = carillon.Trace(step=0.01, frame="scene")
+        trace.step(0, contacts=given)
+        given.second_points = [(4, 5, 6)]
+        trace.step(0, contacts=given)
+        self.assertEqual([list(step.contact_columns[0].second_point_m) for step in trace.steps], [[1, 2, 3], [4, 5, 6]])
+
+    def test_complex_numbers_are_refused_by_the_name_of_their_argument(self):
+        for points in (numpy.array([[1j, 0, 0]]), [[numpy.complex128(1j), 0, 0]], [(1j, 0, 0)]):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                self.refused("points is ", made, contacts=carillon.Contacts(1, points, IMPULSE))
+        self.refused("it must be real and not complex: newton seconds in the stream's frame", made,
+                     contacts=carillon.Contacts(1, POINT, numpy.array([[0, 0, 1 + 0j]])))
 
     def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
         self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
@@ -192,6 +215,42 @@ class WaitingTest(MessagesTest):
             with self.assertRaisesRegex(carillon.ServerUnavailable, "no daemon answers at unix:/nowhere"):
                 with block as record:
                     record.take(*arguments)
+
+
+    def test_what_a_recording_heard_stays_when_its_block_is_left_by_an_exception(self):
+        class Answers:
+            """Five frames in three blocks, of which one was lost before the last; then what stops the program."""
+
+            def __iter__(self):
+                yield audio_service_pb2.ListenResponse(format={"sample_rate_hz": 1, "channel_count": 1})
+                for first, values, lost in ((100, [1, 2], 0), (102, [3, 4], 0), (105, [5], 1)):
+                    yield audio_service_pb2.ListenResponse(block={
+                        "first_frame": first, "samples": numpy.array(values, "<f4").tobytes()}, lost_frame_count=lost)
+
+            def cancel(self):
+                pass
+
+        self.c.audio_stub = types.SimpleNamespace(Listen=lambda request: Answers())
+        with self.assertRaises(KeyboardInterrupt):
+            with self.c.recording() as record:
+                taken = record.take(3)
+                raise KeyboardInterrupt
+        self.assertEqual((taken.first_frame, taken.samples.ravel().tolist()), (100, [1, 2, 3]))
+        self.assertEqual((record.sound.first_frame, record.sound.samples.ravel().tolist()), (103, [4, 5]))
+        self.assertEqual([record.take(1).first_frame, record.take(1).first_frame], [103, 105])
+        self.assertEqual(record.sound.samples.size, 0)
+
+    def test_progress_is_told_in_a_line_where_tqdm_is_missing(self):
+        job = decomposition_pb2.Job(label="bar (transfer)", state=decomposition_pb2.JOB_STATE_RUNNING,
+                                    progress={"phase": decomposition_pb2.PHASE_RADIATE, "fraction": 0.25})
+        with mock.patch.dict("sys.modules", {"tqdm": None, "tqdm.auto": None}), \
+                mock.patch("sys.stderr", io.StringIO()) as told:
+            tell, close = carillon.progress.observer(True, False)
+            tell(job)
+            job.state = decomposition_pb2.JOB_STATE_SUCCEEDED
+            tell(job)
+            close()
+        self.assertEqual(told.getvalue().split(), "bar (transfer) radiate 25 % bar (transfer) done 100 %".split())
 
 
 class AioTest(unittest.TestCase):

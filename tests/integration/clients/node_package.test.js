@@ -141,6 +141,17 @@ test('a rendered strike rings at the lowest bending mode, and is the same again'
   assert.equal((await fs.stat(file)).size, 44 + 3 * once.samples.length);
 });
 
+test('a scene with two ears warns if the daemon plays one channel', async () => {
+  const told = [];
+  const listener = (warning) => told.push(`${warning.name}: ${warning.message}`);
+  process.on('warning', listener);
+  for (const hearing of [{ panning: true }, { distanceGain: true }]) await (await c.createScene({ hearing })).delete();
+  await new Promise(setImmediate);
+  process.off('warning', listener);
+  assert.equal(told.length, 1);
+  assert.match(told[0], /^HearingWarning: scenes\/\d+ has panning or two ears, but the daemon plays one channel, .*--channels 2`$/);
+});
+
 test('a scene with an id is found again with its objects', async () => {
   const made = await c.createScene({ id: 'lathe-1' });
   try {

@@ -8,7 +8,9 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
+import warnings
 
 import numpy
 
@@ -40,6 +42,60 @@ class CallsTest(DaemonTest):
         self.assertGreater(later.uptime_s, info.uptime_s)
         self.assertIn("decomposition", info.features)
         self.assertEqual(info.sample_rate_hz, self.c.status().format.sample_rate_hz)
+
+    def test_a_scene_with_two_ears_warns_if_the_daemon_plays_one_channel(self):
+        for effect in "panning", "binaural":
+            with self.assertWarnsRegex(carillon.HearingWarning, r"^scenes/\d+ has panning or two ears, but the daemon "
+                                       r"plays one channel, which has neither; start it by `carillond --channels "
+                                       r"2`$") as told:
+                self.c.scene(hearing={effect: True}).delete()
+            self.assertEqual((told.filename, len(told.warnings)), (__file__, 1))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            self.c.scene(hearing={"distance_gain": True}).delete()
+            with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+                daemon = Daemon(folder, "--channels", 2)
+                self.addCleanup(daemon.stop)
+                with carillon.connect(daemon.server) as c:
+                    c.scene(hearing={"panning": True, "binaural": True}).delete()
+                daemon.stop()
+
+    def test_a_recording_counts_the_frames_of_a_stream(self):
+        with self.c.scene() as scene, self.c.recording(scene=scene.name) as record:
+            bar = scene.add(self.model)
+            with scene.stream(step=0.001, delay=1) as stream:
+                stream.step(0.0, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
+            heard = record.take(3)
+        due = stream.report.first_frame + heard.sample_rate_hz - heard.first_frame
+        begin = int(numpy.flatnonzero(numpy.abs(heard.samples[:, 0]) > 1e-4)[0])
+        self.assertLess(abs(begin - due), 48)  # a pulse is centred on its time
+        self.assertEqual(record.sound.first_frame, heard.first_frame + len(heard.samples))
+
+    def test_a_program_goes_on_with_the_same_client_when_its_daemon_has_started_anew(self):
+        with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
+            daemon = Daemon(folder)
+            self.addCleanup(daemon.stop)
+            with carillon.connect(daemon.server) as c:
+                model = c.create_model(BAR, meshes.MATERIAL)
+                with self.assertRaises(carillon.ServerUnavailable) as lost, c.scene() as scene, \
+                        scene.stream(step=0.01) as stream:
+                    for number in range(1000):
+                        stream.step(0.01 * number)
+                        if number == 10:
+                            daemon.kill()
+                            daemon.start()
+                        time.sleep(0.01)
+                self.assertTrue(lost.exception.__suppress_context__)
+                for _ in range(60):
+                    try:
+                        with c.scene() as scene:
+                            scene.add(model).strike(POINT, IMPULSE)
+                        break
+                    except carillon.ServerUnavailable:
+                        time.sleep(1)
+                else:
+                    self.fail("the client has not connected again")
+            daemon.stop()
 
     def test_a_scene_with_an_id_is_found_again_with_its_objects(self):
         made = self.c.scene(id="lathe-1", gain=0.5)

@@ -202,6 +202,7 @@ class SoundTest(PackageTest):
         with self.assertRaises(carillon.CarillonError) as refused:
             stream.close()
         self.assertEqual(refused.exception.reason, "SCENE_NOT_FOUND")
+        self.assertTrue(refused.exception.__suppress_context__)  # gRPC's traceback is not shown
 
     def test_a_trace_is_written_read_and_rendered(self):
         trace = carillon.Trace(1 / 60, simulator="test")
@@ -280,6 +281,19 @@ class ContactsTest(PackageTest):
             with scene.stream(step=1 / 240) as stream:
                 stream.step(0.0, **far)
         self.assertEqual([(one.id, one.count) for one in stream.warnings], [("POINTS_DISTANT", 1)])
+
+    def test_one_place_in_the_frame_of_the_scene_is_that_of_both_objects(self):
+        # The same point of both bars would let their sounds cancel each other.
+        place, poses = numpy.add(POINT, (1, 0, 0)), [(1, 0, 0), (0.98, 0, 0.010)]
+
+        def struck(**second):
+            blow = carillon.Impacts(1, [place], [IMPULSE], durations=DURATION_S, second_objects=[2], **second)
+            return self.rendered((0.0, {"impacts": blow}), object_count=2, poses=poses, frame="scene")
+
+        self.assert_same(struck(), struck(second_points=[place]))
+        with self.assertWarns(carillon.ContactWarning) as told:
+            struck(second_points=[(0, 0, 0)])
+        self.assertEqual((told.warning.id, told.warning.count), ("POINTS_DISTANT", 1))
 
 
 class AioTest(PackageTest):

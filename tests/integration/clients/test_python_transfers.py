@@ -70,6 +70,33 @@ class TransfersTest(unittest.TestCase):
             numpy.testing.assert_array_equal(bar.render_strike(**STRIKE).samples, after.samples)
         self.assertGreater(abs(after.peak / before.peak - 1), 0.1)
 
+    def test_a_scene_warns_once_of_a_model_whose_transfer_it_lacks_and_the_sound_changes_when_it_comes(self):
+        bar = self.make()
+        impulse = {key: STRIKE[key] for key in ("point", "impulse", "duration")}
+        with self.c.scene() as scene:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                scene.add(bar, radiation="paper_coupling").remove()
+            with self.assertWarnsRegex(carillon.TransferWarning, r"^bar \(transfer\) is still being computed, so that "
+                                       r"the objects sound by the paper's coupling, at other levels, until they change "
+                                       r"to it; call wait_for_transfer\(\)") as told:
+                objects = scene.add_all([bar, {"model": bar}])
+            self.assertEqual((told.filename, len(told.warnings)), (__file__, 1))
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                scene.add(bar)
+                before = self.heard(scene, objects[0], impulse)
+                self.allow()
+                bar.wait_for_transfer(300)
+                after = self.heard(scene, objects[1], impulse)
+                scene.add(bar)
+        self.assertGreater(abs(after / before - 1), 0.1)
+
+    def heard(self, scene, item, strike):
+        with self.c.recording(scene=scene.name) as record:
+            item.strike(**strike)
+            return record.take(0.3).peak
+
     def test_a_model_without_a_transfer_keeps_nobody_waiting(self):
         bar = self.make(without_transfer=True)
         bar.wait_for_transfer(0)

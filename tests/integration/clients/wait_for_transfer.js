@@ -18,6 +18,15 @@ async function main() {
   await new Promise(setImmediate);
   assert.equal(told.length, 1);
   assert.match(told[0], /^TransferWarning: bar \(transfer\) is still being computed/);
+  const scene = await c.createScene();
+  await scene.add(model, { radiation: 'paper_coupling' });
+  await new Promise(setImmediate);
+  assert.equal(told.length, 1);
+  await scene.addAll([{ model }, { model }]);
+  await scene.add(model);
+  await new Promise(setImmediate);
+  assert.deepEqual(told.slice(1), ["TransferWarning: bar (transfer) is still being computed, so that the objects sound by " +
+    "the paper's coupling, at other levels, until they change to it; await waitForTransfer() of the model first"]);
   await assert.rejects(model.waitForTransfer({ timeout: 0.2 }), (error) => error.reason === 'DEADLINE_EXCEEDED'
     && /bar \(transfer\) is running and has not ended after/.test(error.message));
   fs.writeFileSync(process.argv[3], '');
@@ -27,8 +36,9 @@ async function main() {
   assert.equal(model.summary.transfers.length, 1);
   await model.waitForTransfer({ timeout: 0 });
   const after = await model.renderStrike(STRIKE);
+  await scene.add(model);
   await new Promise(setImmediate);
-  assert.equal(told.length, 1);
+  assert.equal(told.length, 2);
   assert.ok(Math.abs(after.peak / before.peak - 1) > 0.1);
   await assert.rejects(model.waitForTransfer({ timeot: 1 }), /did you mean "timeout"/);
   c.close();

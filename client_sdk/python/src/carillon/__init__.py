@@ -16,7 +16,8 @@ from carillon import aio, fit, motion
 from carillon.address import default_server
 from carillon.client import Client, connect
 from carillon.contacts import ContactForces, Contacts, Impacts, Poses, striker
-from carillon.errors import CarillonError, ContactWarning, LabelWarning, ServerUnavailable, TransferWarning
+from carillon.errors import (
+    CarillonError, ContactWarning, HearingWarning, LabelWarning, ServerUnavailable, TransferWarning)
 from carillon.jobs import Job
 from carillon.materials import material
 from carillon.meshes import MeshFile
@@ -29,6 +30,6 @@ from carillon.traces import Trace
 from carillon.version import __version__
 
 __all__ = ["Ambisonics", "CarillonError", "Client", "ContactForces", "ContactStream", "ContactWarning", "Contacts",
-           "Ears", "HearingEnvironment", "Impacts", "Job", "LabelWarning", "MeshFile", "Model", "Omni", "Performance",
-           "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Stereo", "Trace", "TransferWarning",
-           "__version__", "aio", "connect", "default_server", "fit", "material", "motion", "striker"]
+           "Ears", "HearingEnvironment", "HearingWarning", "Impacts", "Job", "LabelWarning", "MeshFile", "Model",
+           "Omni", "Performance", "Poses", "Scene", "ServerUnavailable", "Sound", "SoundingObject", "Stereo", "Trace",
+           "TransferWarning", "__version__", "aio", "connect", "default_server", "fit", "material", "motion", "striker"]

@@ -119,9 +119,12 @@ def number(value: Any, name: str, meaning: str) -> float:
 def numbers(values: Any, name: str, meaning: str) -> numpy.ndarray:
     """Converts to an array. Raises ValueError that says what the numbers mean if that is impossible."""
     try:
-        return numpy.asarray(values, dtype=float)
+        array = numpy.asarray(values)
+        if array.dtype.kind != "c":
+            return array.astype(float, copy=False)
     except (TypeError, ValueError):
         refuse(values, name, meaning)
+    refuse(values, name, f"real and not complex: {meaning}")
 
 
 def three(values: Any, name: str, meaning: str) -> numpy.ndarray:

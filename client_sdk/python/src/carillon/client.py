@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import AsyncGenerator, Iterable
 from typing import Any, Generic, Optional
 
-from carillon import checks, job_calls, meshes, models, progress, rendering
+from carillon import checks, errors, job_calls, meshes, models, progress, rendering
 from carillon import materials as material_calls
 from carillon.connection import CREDENTIALS, Connection
 from carillon.contacts import Frame, PoseLike, PulseShape, to_pose
@@ -145,12 +146,21 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording, 
                     gain: Optional[float] = None, keep: bool = False, id: str = "", **unknown: Any) -> AnyScene:
         """Makes an empty scene with a linear `gain`. It ends by itself a minute after its clients, unless `keep` is
         true. With an `id`, such as "lathe-1", it is "scenes/lathe-1"; a scene that you made before with this id and the
-        same settings is returned as it is, and its `existing` is true."""
+        same settings is returned as it is, and its `existing` is true. A HearingWarning tells of a `hearing` with
+        panning or two ears whose daemon plays one channel."""
         request = checks.message(scene_service_pb2.CreateSceneRequest, "scene", dict(
             hearing=hearing, listener=None if listener is None else to_pose(listener, "listener"), gain=gain, keep=keep,
             id=id, **unknown))
         made = await self.ask(self.scenes_stub.CreateScene, request)
+        if request.hearing.panning or request.hearing.binaural:
+            await self._warn_of_one_channel(made.name)
         return self._scene_kind(self, made.name, made.existing)
+
+    async def _warn_of_one_channel(self, scene: str) -> None:
+        """Warns if the daemon plays one channel. A caller who may not ask for its output gets no warning."""
+        with contextlib.suppress(errors.CarillonError):
+            if (await ClientCalls.status(self)).format.channel_count == 1:
+                errors.warn_of_one_channel(scene)
 
     @call
     async def scenes(self) -> list[AnyScene]:

@@ -56,6 +56,7 @@ class Connection(Block):
                                        "give tls_roots, or the address of a daemon on this machine, or no token")
         self._pem_files = [path and pathlib.Path(path).read_bytes() for path in (tls_roots, tls_key, tls_certificate)]
         self.catalogue: Optional[dict[str, material_pb2.Material]] = None  # of materials, once it was asked for
+        self.sounded_models: set[str] = set()  # for which it was asked whether their transfer is being computed
         forks.open_in_children(self)
 
     @functools.cached_property

@@ -31,7 +31,8 @@ LARGEST_TIME_S = 1e10
 STREAM_FRAME = "in the stream's frame, which is each object's own unless it was opened with frame=\"scene\""
 ROTATION = "a quaternion w, x, y, z of length 1"
 MEANINGS = {
-    "points": f"metres {STREAM_FRAME}", "second_points": f"metres {STREAM_FRAME}",
+    "points": f"metres {STREAM_FRAME}", "second_points": "metres in the second object's own frame, or in the "
+    "scene's in a stream with frame=\"scene\"",
     "impulses": f"newton seconds {STREAM_FRAME}", "forces": f"newtons {STREAM_FRAME}",
     "second_rotations": f"{ROTATION} from the first object's frame into the second's",
     "positions": "metres in the scene's frame",
@@ -79,8 +80,10 @@ class Impacts(_Impulses):
     `impulses` (N x 3, newton seconds) are in the frame of the stream, by default each object's own. `durations` are
     seconds, zero or more; NaN leaves one to the daemon, which computes it from the object and from `striker`.
     `time_offsets` are seconds from the step's time to the impact. `second_objects` has the objects that struck, zero
-    for none; `second_rotations` (N x 4, quaternions w, x, y, z) rotate from the first object's frame into the second's.
-    `environments` are those of a performance, by their index."""
+    for none. `second_points` (N x 3, metres) are the same places in each second object's own frame; in a stream with
+    frame="scene" they are in the scene's frame, and by default the points. `second_rotations` (N x 4, quaternions
+    w, x, y, z) rotate from the first object's frame into the second's. `environments` are those of a performance, by
+    their index."""
 
 
 @dataclasses.dataclass
@@ -239,10 +242,10 @@ def _pairs(points: Array, vectors: Array, name: str) -> tuple[numpy.ndarray, num
     return places, values
 
 
-def add_contacts(step: contact_pb2.ContactStep, given: Union[_Impulses, ContactForces]) -> int:
-    """Adds contacts of one kind to a step and returns their number."""
+def add_contacts(step: contact_pb2.ContactStep, given: Union[_Impulses, ContactForces], frame: int) -> int:
+    """Adds contacts of one kind, in a Frame, to a step and returns their number."""
     _refuse_environments(given)
-    return fill_columns(step.contact_columns.add(), given)
+    return fill_columns(step.contact_columns.add(), given, frame)
 
 
 def _refuse_environments(given: Any) -> None:
@@ -250,8 +253,8 @@ def _refuse_environments(given: Any) -> None:
         raise ValueError("environments are those of a performance (Client.perform); a stream or a trace has none")
 
 
-def fill_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, ContactForces]) -> int:
-    """Fills in the columns of contacts of one kind and returns their number."""
+def fill_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, ContactForces], frame: int) -> int:
+    """Fills in the columns of contacts of one kind, in a Frame, and returns their number."""
     is_force = isinstance(given, ContactForces)
     points, vectors = _pairs(given.points, given.forces if isinstance(given, ContactForces) else given.impulses,
                              "forces" if is_force else "impulses")
@@ -270,7 +273,7 @@ def fill_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, Co
         columns.roughness_depth = given.roughness_depth
         columns.irregularity_length_m = given.irregularity_length
     if given.second_objects is not None:
-        _fill_second_columns(columns, given, count)
+        _fill_second_columns(columns, given, points, frame)
     return count
 
 
@@ -291,11 +294,14 @@ def _fill_collision_columns(columns: contact_pb2.ContactColumns, given: _Impulse
 
 
 def _fill_second_columns(columns: contact_pb2.ContactColumns, given: Union[_Impulses, ContactForces],
-                         count: int) -> None:
-    if given.second_points is None:
-        raise ValueError("second_objects without second_points: each contact needs a point on its second object")
-    append(columns, second_object=handles_of(given.second_objects, count, "second_objects"),
-           second_point_m=_rows(given.second_points, "second_points", 3, count))
+                         points: numpy.ndarray, frame: int) -> None:
+    count = len(points)
+    if given.second_points is not None:
+        points = _rows(given.second_points, "second_points", 3, count)
+    elif frame != contact_pb2.FRAME_SCENE:  # there one place has the same coordinates for both objects
+        raise ValueError("second_objects without second_points: each contact needs its place in the frame of its "
+                         "second object, too, unless the frame is \"scene\"")
+    append(columns, second_object=handles_of(given.second_objects, count, "second_objects"), second_point_m=points)
     if given.second_rotations is not None:
         append(columns, second_rotation=_rows(given.second_rotations, "second_rotations", 4, count))
 
@@ -357,15 +363,16 @@ def checked_scale(scale: Optional[float]) -> Optional[float]:
 
 def make_step(time: float, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
               forces: Optional[ContactForces] = None, poses: Optional[Poses] = None,
-              listener: Optional[PoseLike] = None, time_scale: Optional[float] = None) -> contact_pb2.ContactStep:
-    """Makes the message of the step at a simulation time, seconds."""
+              listener: Optional[PoseLike] = None, time_scale: Optional[float] = None,
+              frame: int = contact_pb2.FRAME_OBJECT) -> contact_pb2.ContactStep:
+    """Makes the message of the step at a simulation time, seconds, of a stream or trace with this Frame."""
     step = contact_pb2.ContactStep(time_s=checks.number(time, "time", "the simulation time in seconds"),
                                    time_scale=checked_scale(time_scale))
     for name, given, kind in (("contacts", contacts, Contacts), ("impacts", impacts, Impacts),
                               ("forces", forces, ContactForces)):
         if given is not None:
             checks.expect(given, kind, name)
-            add_contacts(step, given)
+            add_contacts(step, given, frame)
     if poses is not None:
         checks.expect(poses, Poses, "poses")
         add_poses(step, poses)

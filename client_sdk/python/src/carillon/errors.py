@@ -56,7 +56,11 @@ class ContactWarning(UserWarning):
 
 
 class TransferWarning(UserWarning):
-    """An object sounded before it was computed how it radiates, so that the same request will sound different."""
+    """An object sounds before it is computed how it radiates, so that it will sound different later."""
+
+
+class HearingWarning(UserWarning):
+    """A scene is to be heard from left and right, and the daemon plays one channel."""
 
 
 class LabelWarning(UserWarning):
@@ -70,6 +74,12 @@ def warn_of_label(label: str, wanted: str) -> None:
           "the object", LabelWarning)
 
 
+def warn_of_one_channel(scene: str) -> None:
+    """Warns of a scene with panning or two ears whose daemon plays one channel."""
+    _warn(f"{scene} has panning or two ears, but the daemon plays one channel, which has neither; start it by "
+          "`carillond --channels 2`", HearingWarning)
+
+
 def warn_of_open_stream(scene: str) -> None:
     """Warns of a stream that was not closed before the program ended."""
     _warn(ContactWarning(warning_pb2.Warning(
@@ -77,12 +87,11 @@ def warn_of_open_stream(scene: str) -> None:
         "sounded; close it, or use it as a context manager")))
 
 
-def warn_of_transfers(labels: Sequence[str]) -> None:
-    """Warns of the jobs with these labels, whose transfers a rendering would have used."""
+def warn_of_transfers(labels: Sequence[str], meanwhile: str) -> None:
+    """Warns of the jobs with these labels, whose transfers the objects lack, and says how these sound meanwhile."""
     jobs = ", ".join(labels)
-    _warn(f"{jobs} {'is' if len(labels) == 1 else 'are'} still being computed, so that the sound is by the paper's "
-          "coupling, and the same rendering will sound different later; call wait_for_transfer() of the model first",
-          TransferWarning)
+    _warn(f"{jobs} {'is' if len(labels) == 1 else 'are'} still being computed, so that {meanwhile}; call "
+          "wait_for_transfer() of the model first", TransferWarning)
 
 
 def warn_of_contacts(told: Iterable[warning_pb2.Warning]) -> None:
@@ -129,4 +138,4 @@ def translated(server: str) -> Iterator[None]:
     try:
         yield
     except grpc.RpcError as error:
-        raise from_rpc(error, server) from error
+        raise from_rpc(error, server) from None  # gRPC's traceback says nothing more

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator, Callable, Iterable
+import contextlib
+from collections.abc import AsyncGenerator, Callable, Collection, Iterable
 from typing import Any, Optional
 
 from carillon import checks, errors, progress
@@ -36,6 +37,17 @@ async def listed(connection: Connection, states: Iterable[str] = (),
         if not page.next_page_token:
             return
         request.page_token = page.next_page_token
+
+
+async def warn_of_transfers(connection: Connection, models: Collection[str], meanwhile: str) -> None:
+    """Warns if transfers of the models are being computed, and says how the objects sound meanwhile. A caller who may
+    not list jobs gets no warning."""
+    labels = []
+    with contextlib.suppress(errors.CarillonError):
+        labels = [job.label or job.name async for job in listed(connection, ["queued", "running"])
+                  if is_transfer(job) and job.modal_model in models]
+    if labels:
+        errors.warn_of_transfers(labels, meanwhile)
 
 
 async def follow(connection: Connection, job: decomposition_pb2.Job, timeout: Optional[float],

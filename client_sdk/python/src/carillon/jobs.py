@@ -46,8 +46,9 @@ class JobCalls(Generic[AnyModel]):
     @call
     async def wait(self, progress_bar: progress.Progress = None, timeout: Optional[float] = None) -> AnyModel:
         """Follows the job to its end and returns its model. `progress_bar` is a function, which gets each state of the
-        job, True for a bar of tqdm, False for none, and None for a bar where somebody watches, but not in asyncio.
-        Raises CarillonError if the job fails, or if it has not ended after `timeout` seconds (DEADLINE_EXCEEDED)."""
+        job, True for a bar of tqdm or a line, False for none, and None for a bar where somebody watches, but not in
+        asyncio. Raises CarillonError if the job fails, or if it has not ended after `timeout` seconds
+        (DEADLINE_EXCEEDED)."""
         on_progress, close = progress.observer(progress_bar, not self.is_awaited)
 
         def note(message: decomposition_pb2.Job) -> None:

@@ -118,7 +118,7 @@ class ModelCalls:
         """Waits until the daemon has computed how the model radiates, which it begins when the model is stored. Before
         that, objects sound by the paper's coupling, at other levels and without damping by radiation. Returns at once
         if no transfer of the model is being computed. Raises CarillonError if the computation failed, or if it has not
-        ended after `timeout` seconds (DEADLINE_EXCEEDED)."""
+        ended after `timeout` seconds (DEADLINE_EXCEEDED). `progress_bar` as for Job.wait."""
         end_s = None if timeout is None else time.monotonic() + timeout
         for job in await self._transfer_jobs():
             on_progress, close = progress.observer(progress_bar, not self.client.is_awaited)

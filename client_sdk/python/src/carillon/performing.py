@@ -210,7 +210,7 @@ class PerformanceCalls(Block):
         CarillonError if a contact is rejected; the step was performed without it."""
         scale = checked_scale(time_scale)
         step = performance_pb2.PerformStep(time_scale=scale)
-        _fill(step, contacts, impacts, forces, poses)
+        _fill(step, self._settings.frame, contacts, impacts, forces, poses)
         for rows in (*step.contacts, step.poses):
             self._check(max(rows.environment, default=0))
         step.MergeFrom(self._next)
@@ -265,14 +265,14 @@ class PerformanceCalls(Block):
         return f"<{type(self).__name__} of {checks.counted(self.environment_count, 'environment')}>"
 
 
-def _fill(step: performance_pb2.PerformStep, reported: Optional[Contacts], impacts: Optional[Impacts],
+def _fill(step: performance_pb2.PerformStep, frame: int, reported: Optional[Contacts], impacts: Optional[Impacts],
           forces: Optional[ContactForces], poses: Optional[Poses]) -> None:
     for name, given, kind in (("contacts", reported, Contacts), ("impacts", impacts, Impacts),
                               ("forces", forces, ContactForces)):
         if given is not None:
             checks.expect(given, kind, name)
             message = step.contacts.add()
-            count = contacts.fill_columns(message.columns, given)
+            count = contacts.fill_columns(message.columns, given, frame)
             _fill_environments(message, given.environments, count)
     if poses is not None:
         checks.expect(poses, Poses, "poses")

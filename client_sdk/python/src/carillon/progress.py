@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the progress of a decomposition: by tqdm where it is installed and somebody watches."""
+"""Shows the progress of a decomposition where somebody watches: by tqdm, or in a line where that is missing."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _is_watched() -> bool:
 
 
 class ProgressBar:
-    """A bar of tqdm; nothing where tqdm is missing."""
+    """A bar of tqdm; a line on stderr where tqdm is missing."""
 
     def __init__(self) -> None:
         try:
@@ -57,14 +57,19 @@ class ProgressBar:
             self._bar = tqdm(total=100, unit="%", bar_format="{desc:<24}{percentage:3.0f}%|{bar}| {elapsed}")
 
     def __call__(self, job: decomposition_pb2.Job) -> None:
-        if self._bar is None:
-            return
         done = job.state == decomposition_pb2.JOB_STATE_SUCCEEDED
-        self._bar.n = 100 if done else round(100 * job.progress.fraction)
-        self._bar.set_description(f"{job.label} {activity(job)}")
+        percent = 100 if done else round(100 * job.progress.fraction)
+        text = f"{job.label} {activity(job)}"
+        if self._bar is None:
+            print(f"\r{text:<70.70} {percent:3} %", end="", file=sys.stderr, flush=True)
+            return
+        self._bar.n = percent
+        self._bar.set_description(text)
 
     def close(self) -> None:
-        if self._bar is not None:
+        if self._bar is None:
+            print(file=sys.stderr)
+        else:
             self._bar.close()
 
 

@@ -20,13 +20,16 @@ from carillon.v1 import audio_service_pb2, contact_service_pb2
 
 class _Recording(Block):
     """What the daemon plays within the block, from its first line on, which `take` returns piece by piece. `sound` is
-    what was heard and not taken yet."""
+    what was heard and not taken yet, also after the block, however it ended."""
 
     def __init__(self, client: Connection, request: dict[str, Any]):
         self._client = client
         self._request = checks.message(audio_service_pb2.ListenRequest, "recording", request)
         self._heard = bytearray()
         self._lost = self._told_lost = 0
+        self._taken = 0  # frames
+        # Where the numbers of frames leap: how many frames were heard before, and what to add to such a count.
+        self._leaps: list[tuple[int, int]] = []
         self._error: Optional[errors.CarillonError] = None
         self._call: Any = None
 
@@ -40,6 +43,9 @@ class _Recording(Block):
         return answers
 
     def _take_in(self, answer: audio_service_pb2.ListenResponse) -> None:
+        count = self._taken + len(self._heard) // self._frame_bytes
+        if not self._leaps or answer.block.first_frame != count + self._leaps[-1][1]:
+            self._leaps.append((count, answer.block.first_frame - count))
         self._heard += answer.block.samples
         self._lost = answer.lost_frame_count
 
@@ -52,7 +58,12 @@ class _Recording(Block):
         if self._short:
             samples = samples.astype("<f4") / 32767
         return Sound(samples.reshape(-1, self._format.channel_count), self._format.sample_rate_hz,
-                     self._lost - self._told_lost)
+                     self._lost - self._told_lost, first_frame=self._first_frame())
+
+    def _first_frame(self) -> Optional[int]:
+        """The number of the first frame that was not taken yet; None before anything was heard."""
+        before = [added for count, added in self._leaps if count <= self._taken]
+        return self._taken + before[-1] if before else None
 
     def _has(self, frame_count: int) -> bool:
         """Whether a take of so many frames need not wait."""
@@ -69,13 +80,14 @@ class _Recording(Block):
             raise self._error
         taken = self._sound_of(bytes(self._heard[:end]))
         del self._heard[:end]
+        self._taken += frame_count
         self._told_lost = self._lost
         return taken
 
 
 class Recording(BlockingBlock, _Recording):
     """What the daemon plays within the block, from its first line on; a thread collects it. `sound` is what was heard
-    and not taken yet."""
+    and not taken yet, also after the block, however it ended."""
 
     async def _enter(self) -> None:
         answers = await self._open()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Iterator
 from typing import Any, Optional
@@ -73,16 +72,8 @@ async def _render(connection: Connection, trace: Trace, given: dict[str, Any], e
             raise errors.CarillonError(warning.id, warning.text)
     errors.warn_of_contacts(summary.warnings)
     if summary.paper_coupling_object_count:
-        await _warn_of_transfers(connection, {item.modal_model for item in trace.objects})
+        await job_calls.warn_of_transfers(connection, {item.modal_model for item in trace.objects},
+                                          "the sound is by the paper's coupling, and the same rendering will sound "
+                                          "different later")
     samples = numpy.frombuffer(b"".join(blocks), "<f4").reshape(-1, channels)
     return Sound(samples, rate_hz, summary=summary, blows=tuple(blows))
-
-
-async def _warn_of_transfers(connection: Connection, models: set[str]) -> None:
-    """Warns if transfers of the models are being computed. A caller who may not list jobs gets no warning."""
-    labels = []
-    with contextlib.suppress(errors.CarillonError):
-        labels = [job.label or job.name async for job in job_calls.listed(connection, ["queued", "running"])
-                  if job_calls.is_transfer(job) and job.modal_model in models]
-    if labels:
-        errors.warn_of_transfers(labels)

@@ -7,7 +7,7 @@ import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any, Generic, Optional, TypeVar
 
-from carillon import checks, contacts, errors, materials
+from carillon import checks, contacts, errors, job_calls, materials
 from carillon.connection import Connection
 from carillon.contacts import Array, PoseLike
 from carillon.faces import Awaited, AwaitedBlock, Block, Blocking, BlockingBlock, call
@@ -15,7 +15,7 @@ from carillon.recordings import (
     AnyRecording, AnyTraceRecording, AsyncRecording, AsyncTraceRecording, Recording, TraceRecording, heard)
 from carillon.sound import Sound
 from carillon.streams import AnyStream, AsyncContactStream, ContactStream, StreamCalls
-from carillon.v1 import contact_service_pb2, scene_service_pb2
+from carillon.v1 import contact_service_pb2, radiation_pb2, scene_service_pb2
 
 ADD_ARGUMENTS = ("model", "material", "size", "gain", "pose", "handle", "radiation")
 
@@ -128,14 +128,26 @@ class SceneCalls(Block, Generic[AnyObject, AnyStream, AnyRecording, AnyTraceReco
                   size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,
                   radiation: Optional[materials.Radiation] = None) -> AnyObject:
         """Adds an object, ready to be struck. Without a material it gets the one that the model was asked for with.
-        `gain` is linear, as in SoundingObject.update."""
+        `gain` is linear, as in SoundingObject.update. A TransferWarning tells, once a model, that it is still being
+        computed how the model radiates."""
         wanted = self._new_object(model, material, size=size, gain=gain, pose=pose, handle=handle, radiation=radiation)
         return (await self._add([wanted]))[0]
 
     async def _add(self, wanted: list[scene_service_pb2.NewObject]) -> list[AnyObject]:
         request = scene_service_pb2.AddObjectsRequest(scene=self.name, objects=wanted)
         answer = await self.client.ask(self.client.scenes_stub.AddObjects, request)
+        await self._warn_of_transfers({item.modal_model for asked, item in zip(wanted, answer.objects)
+                                       if asked.radiation == radiation_pb2.RADIATION_MODEL_UNSPECIFIED
+                                       and item.radiation == radiation_pb2.RADIATION_MODEL_PAPER_COUPLING})
         return [self._object_kind(self, item) for item in answer.objects]
+
+    async def _warn_of_transfers(self, models: set[str]) -> None:
+        """Warns, once of each model, if the transfers that the objects lack are being computed."""
+        unasked = models - self.client.sounded_models
+        self.client.sounded_models |= unasked
+        if unasked:
+            await job_calls.warn_of_transfers(self.client, unasked, "the objects sound by the paper's coupling, at "
+                                              "other levels, until they change to it")
 
     def _new_object(self, model: materials.ModelLike | str, material: Optional[materials.Material] = None, *,
                     size: float = 1, gain: float = 1, pose: Optional[PoseLike] = None, handle: int = 0,

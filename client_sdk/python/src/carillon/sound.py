@@ -19,8 +19,9 @@ from carillon.v1 import audio_service_pb2
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Sound:
-    """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received. `summary` has
-    what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts.
+    """Frames x channels of float32; full scale is 1. `lost_frame_count` frames were not received. `first_frame` of a
+    recording is the number of its first frame since the daemon's start, as `report.first_frame` of a stream. `summary`
+    has what the daemon measured while it rendered the sound offline: loudness, pressure, findings about the contacts.
     `blows` are the impulses that sounded, if Client.render was asked for them with tell_blows=True."""
 
     samples: numpy.ndarray
@@ -28,6 +29,7 @@ class Sound:
     lost_frame_count: int = 0
     summary: Optional[audio_service_pb2.RenderSummary] = None
     blows: tuple[audio_service_pb2.Blow, ...] = ()
+    first_frame: Optional[int] = None
 
     def __repr__(self) -> str:
         return (f"<Sound: {self.seconds:.3g} s, {self.sample_rate_hz} Hz, "

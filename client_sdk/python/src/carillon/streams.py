@@ -109,7 +109,7 @@ class StreamCalls(Block):
         for columns in (contacts, impacts, forces, poses):
             _refuse_other_scenes(columns, self._start.scene)
         self._put(make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener,
-                            time_scale=time_scale))
+                            time_scale=time_scale, frame=self._start.frame))
 
     def _put(self, step: contact_pb2.ContactStep) -> None:
         if self._is_closed:
@@ -117,7 +117,7 @@ class StreamCalls(Block):
                                        "not sound; open another one by Scene.stream")
         if self._error:
             _open_streams.streams.discard(self)
-            raise self._error
+            raise self._error.with_traceback(None)  # not that of the thread which reads
         contacts.refuse_time(step.time_s, self._step_count, self._time_s, "open another stream for another run")
         self._step_count, self._time_s = self._step_count + 1, step.time_s
         if self._steps.qsize() >= MOST_WAITING:

@@ -59,7 +59,7 @@ class Trace:
         for columns in (contacts, impacts, forces, poses):
             _refuse_objects_of_scenes(columns)
         made = make_step(time, contacts=contacts, impacts=impacts, forces=forces, poses=poses, listener=listener,
-                         time_scale=time_scale)
+                         time_scale=time_scale, frame=self.header.frame)
         refuse_time(made.time_s, len(self.steps), self.steps[-1].time_s if self.steps else 0,
                     "make another trace for another run")
         self.steps.append(made)
