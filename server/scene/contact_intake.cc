@@ -174,12 +174,16 @@ absl::Status ContactIntake::TryTouch(const ObjectTouch& touch) {
   }
   BodyImpulses impulses;
   RETURN_IF_ERROR(Locate(touch.contact, PointSource::kEngine, 1, impulses));
+  using enum MomentumBalance::Role;
   for (const BodyImpulse& one : balance_ ? impulses.all() : std::span<const BodyImpulse>()) {
     balance_->Touch({.handle = one.handle,
                      .mass_kg = one.mass_kg,
                      .impulse_newton_seconds = one.impulse().impulse_newton_seconds,
                      .vertices = one.impulse().at.vertices,
-                     .weights = one.impulse().at.weights});
+                     .weights = one.impulse().at.weights,
+                     .role = impulses.count == 1       ? kOnly
+                             : &one == &impulses.by[0] ? kFirst
+                                                       : kSecond});
   }
   gatherer_.Touch(touch, impulses);
   return absl::OkStatus();

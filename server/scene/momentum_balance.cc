@@ -362,8 +362,13 @@ void MomentumBalance::CountEqual() {
     return std::tuple(report.handle, report.vertices, report.impulse_newton_seconds);
   });
   touch_count_ += reports_.size();
+  pair_touch_count_ += static_cast<uint64_t>(std::ranges::count_if(
+      reports_, [](const Report& report) { return report.role != Role::kOnly; }));
   for (size_t i = 1; i < reports_.size(); ++i) {
-    if (IsEqual(reports_[i - 1], reports_[i])) equal_count_ += 2;
+    const Report &a = reports_[i - 1], &b = reports_[i];
+    if (!IsEqual(a, b)) continue;
+    equal_count_ += 2;
+    if (a.role != b.role && a.role != Role::kOnly && b.role != Role::kOnly) mirrored_count_ += 2;
   }
 }
 
@@ -387,10 +392,13 @@ EngineMistakes MomentumBalance::mistakes() const {
     stale.count += body.stale_count;
   }
   MistakeSize& twice = found[static_cast<size_t>(EngineMistake::kTwice)];
-  const bool equal =
-      static_cast<double>(equal_count_) >= kMostEqual * static_cast<double>(touch_count_);
-  if (equal && equal_count_ >= 2 * kFewestBlows && right_count_ == 0) {
-    twice.count = equal_count_ / 2;
+  const auto most_of = [](uint64_t count, uint64_t all) {
+    return count >= 2 * kFewestBlows &&
+           static_cast<double>(count) >= kMostEqual * static_cast<double>(all);
+  };
+  const bool equal = most_of(equal_count_, touch_count_) && right_count_ == 0;
+  if (equal || most_of(mirrored_count_, pair_touch_count_)) {
+    twice.count = std::max(equal ? equal_count_ : 0, mirrored_count_) / 2;
     twice.ratio = 2;
     twice.handle = bodies_.empty() ? 0 : bodies_.begin()->first;
   }

@@ -53,7 +53,8 @@ using EngineMistakes = std::array<MistakeSize, kEngineMistakeCount>;
 /// rest show the ratio of their load to their weight.
 ///
 /// Bodies without poses are judged by what they cannot do: to carry 9.81 m/s^2 over the step in
-/// each step, and by contacts that are equal.
+/// each step, and by contacts that are equal. Two objects whose contacts come from both sides,
+/// (a, b, J) and (b, a, -J), are judged by that alone.
 class MomentumBalance {
  public:
   /// `step_s` is the simulator's step, seconds, and `scene_frame` whether the impulses were stated
@@ -64,6 +65,9 @@ class MomentumBalance {
   /// orientation.
   void Move(uint32_t handle, const Vector3& centre_m, const Quaternion& orientation);
 
+  /// What a body is in a contact: the only object, or the first or the second of two.
+  enum class Role : uint8_t { kOnly, kFirst, kSecond };
+
   /// Tells an impulse that a body is said to get in the step.
   struct Report {
     uint32_t handle = 0;
@@ -72,6 +76,7 @@ class MomentumBalance {
     /// The vertices and weights of the point on the surface.
     std::array<uint32_t, 3> vertices{};
     std::array<float, 3> weights{};
+    Role role = Role::kOnly;
   };
   void Touch(const Report& report) { reports_.push_back(report); }
 
@@ -167,7 +172,8 @@ class MomentumBalance {
   Vector3 gravity_{};                    // their median
   bool has_gravity_ = false;
   uint64_t touch_count_ = 0, equal_count_ = 0;
-  uint64_t right_count_ = 0, judged_count_ = 0;  // blows
+  uint64_t pair_touch_count_ = 0, mirrored_count_ = 0;  // of contacts of two objects
+  uint64_t right_count_ = 0, judged_count_ = 0;         // blows
   EngineMistakes counted_{};
   std::optional<double> time_s_;
 };

@@ -64,34 +64,31 @@ void AddStepWarnings(const IntakeFindings& findings, Warnings& warnings) {
 struct MistakeText {
   const char* id;
   const char* nouns;    // what the count counts
-  const char* meaning;  // follows the count
+  const char* meaning;  // follows the count; the size of the mistake follows it
+  const char* repair;
 };
 
 /// By EngineMistake.
 constexpr std::array<MistakeText, kEngineMistakeCount> kMistakes{{
-    {"IMPULSES_ARE_FORCES", "blows or steps of loads",
-     "forces in place of impulses; give newton seconds, which are newtons times the step"},
-    {"CONTACTS_TWICE", "blows or contacts",
-     "each contact twice; leave out the second report of each pair, such as (b, a) beside (a, b)"},
+    {"IMPULSES_ARE_FORCES", "blows or steps of loads", "forces in place of impulses",
+     "give newton seconds, which are newtons times the step"},
+    {"CONTACTS_TWICE", "blows or contacts", "each contact twice",
+     "leave out the second report of each pair, such as (b, a) beside (a, b)"},
     {"CONTACTS_STALE", "steps",
-     "the impulse of an earlier step again, though the body does not feel it; send an impulse only "
-     "in the step in which the engine computed it"},
-    {"LAST_SUBSTEP_ONLY", "blows or steps of loads",
-     "the impulses of the last substep alone; add up those of all substeps, or send each as a "
-     "step"},
-    {"IMPULSES_REVERSED", "blows or steps of loads",
-     "the impulse on the other body; change its sign"},
-    {"IMPULSES_IN_OTHER_FRAME", "blows",
-     "impulses in another frame than the stated one; turn them, or state the frame of the scene or "
-     "of the object"},
-    {"CONTACTS_ONE_STEP_LATE", "blows",
-     "impulses that acted a step or two before; read them before the next step begins"},
-    {"FIRST_IMPULSES_ZERO", "blows",
-     "no impulse in the step in which the contact begins; read impulses after the engine has "
-     "solved its step"},
-    {"MASSES_DIFFER", "blows",
-     "impulses on a body of another mass than the object's; give the engine the mass of the model, "
-     "or the object the engine's density"},
+     "the impulse of an earlier step again, though the body does not feel it",
+     "send an impulse only in the step in which the engine computed it"},
+    {"LAST_SUBSTEP_ONLY", "blows or steps of loads", "the impulses of the last substep alone",
+     "add up those of all substeps, or send each as a step"},
+    {"IMPULSES_REVERSED", "blows or steps of loads", "the impulse on the other body",
+     "change its sign"},
+    {"IMPULSES_IN_OTHER_FRAME", "blows", "impulses in another frame than the stated one",
+     "turn them, or state the frame of the scene or of the object"},
+    {"CONTACTS_ONE_STEP_LATE", "blows", "impulses that acted a step or two before",
+     "read them before the next step begins"},
+    {"FIRST_IMPULSES_ZERO", "blows", "no impulse in the step in which the contact begins",
+     "read impulses after the engine has solved its step"},
+    {"MASSES_DIFFER", "blows", "impulses on a body of another mass than the object's",
+     "give the engine the mass of the model, or the object the engine's density"},
 }};
 
 /// Returns whether the motion is a thousand times that of the impulses, and points lie far away.
@@ -125,10 +122,11 @@ void AddMistakes(const IntakeFindings& findings, Warnings& warnings) {
     if (size.count == 0 || is_of_units) continue;
     std::string ratio;
     if (size.ratio > 0) ratio = absl::StrFormat(", %.3g times the true impulses", size.ratio);
-    v1::Warning& warning = Add(
-        warnings, kMistakes[i].id, size.count,
-        absl::StrCat("by the balance of momentum, ", size.count, " ", kMistakes[i].nouns,
-                     " of object ", size.handle, " and others show ", kMistakes[i].meaning, ratio));
+    const MistakeText& text = kMistakes[i];
+    v1::Warning& warning =
+        Add(warnings, text.id, size.count,
+            absl::StrCat("by the balance of momentum, ", size.count, " ", text.nouns, " of object ",
+                         size.handle, " and others show ", text.meaning, ratio, "; ", text.repair));
     if (size.ratio > 0) SetFigure(warning, "ratio", size.ratio);
     SetFigure(warning, "object", size.handle);
   }

@@ -260,5 +260,38 @@ TEST(MomentumBalance, WithoutPosesItNamesForcesAndEqualContacts) {
   }
 }
 
+TEST(MomentumBalance, NamesContactsOfTwoObjectsFromBothSidesBesideRightOnesWithAFloor) {
+  using enum MomentumBalance::Role;
+  const auto balanced = [](bool mirrors) {
+    MomentumBalance balance(1 / 240.0, false);
+    for (int k = 0; k < 240; ++k) {
+      const auto touch = [&](uint32_t handle, uint32_t vertex, double impulse,
+                             MomentumBalance::Role role) {
+        balance.Touch({.handle = handle,
+                       .mass_kg = kMassKg,
+                       .impulse_newton_seconds = {0, 0, static_cast<float>(impulse)},
+                       .vertices = {vertex, 0, 0},
+                       .weights = {1, 0, 0},
+                       .role = role});
+      };
+      for (uint32_t corner = 0; corner < 4; ++corner)
+        touch(1, corner, 0.004 + 0.001 * corner, kOnly);
+      if (k % 60 == 30) {
+        touch(1, 7, -0.3, kFirst);
+        touch(2, 5, 0.3, kSecond);
+        if (mirrors) {
+          touch(2, 5, 0.3, kFirst);
+          touch(1, 7, -0.3, kSecond);
+        }
+      }
+      balance.EndStep(k / 240.0);
+    }
+    return balance.mistakes()[static_cast<size_t>(EngineMistake::kTwice)];
+  };
+  EXPECT_EQ(balanced(false).count, 0);
+  EXPECT_EQ(balanced(true).count, 8);  // four, each twice
+  EXPECT_EQ(balanced(true).ratio, 2);
+}
+
 }  // namespace
 }  // namespace carillon
