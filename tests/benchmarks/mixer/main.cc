@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// mixer_measure ringing|struck|directed|accuracy|flood|population [ARGUMENTS...]
+// mixer_measure ringing|struck|directed|flood|population [ARGUMENTS...]
 #include <hwy/targets.h>
 
 #include <cstdio>
@@ -11,15 +11,14 @@
 int main(int count, char** values) {
   using carillon::Arguments;
   const std::map<std::string, int (*)(const Arguments&)> programs = {
-      {"ringing", carillon::MeasureRinging},     {"struck", carillon::MeasureStruck},
-      {"accuracy", carillon::MeasureAccuracy},   {"flood", carillon::MeasureFlood},
-      {"population", carillon::PrintPopulation}, {"directed", carillon::MeasureDirected},
+      {"ringing", carillon::MeasureRinging},   {"struck", carillon::MeasureStruck},
+      {"flood", carillon::MeasureFlood},       {"population", carillon::PrintPopulation},
+      {"directed", carillon::MeasureDirected},
   };
   const auto found = count > 1 ? programs.find(values[1]) : programs.end();
   if (found == programs.end()) {
-    std::fprintf(
-        stderr,
-        "usage: mixer_measure ringing|struck|directed|accuracy|flood|population [ARGUMENTS...]\n");
+    std::fprintf(stderr,
+                 "usage: mixer_measure ringing|struck|directed|flood|population [ARGUMENTS...]\n");
     return 2;
   }
   // CARILLON_MOST_TARGET=AVX2 renders as a machine without AVX-512 would.

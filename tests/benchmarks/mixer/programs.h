@@ -15,8 +15,6 @@ int MeasureRinging(const Arguments& arguments);
 int MeasureStruck(const Arguments& arguments);
 /// SECONDS of sound a measurement.
 int MeasureDirected(const Arguments& arguments);
-/// SECONDS of sound.
-int MeasureAccuracy(const Arguments& arguments);
 /// SECONDS, IMPULSES_PER_SECOND; without that, three rates.
 int MeasureFlood(const Arguments& arguments);
 /// Prints the population, one "frequency_hz t60_s amplitude" a line, for other programs. COUNT

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How many modes one core renders in real time: ringing freely, and struck in every block.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -134,6 +135,17 @@ int MeasureStruck(const Arguments& arguments) {
     MeasureStruck("struck for 0.1 ms", modes, seconds, Pulse::RaisedCosine(1e-4F));
     MeasureStruck("struck for 0.4 ms", modes, seconds, Pulse::RaisedCosine(4e-4F));
     MeasureStruck("struck for 0.1 ms, Gaussian", modes, seconds, Pulse::Gaussian(1e-4F));
+  }
+  return EXIT_SUCCESS;
+}
+
+int PrintPopulation(const Arguments& arguments) {
+  const auto count =
+      static_cast<uint32_t>(arguments.empty() ? kModesABank : std::stoul(arguments[0]));
+  const uint64_t seed = arguments.size() < 2 ? 1 : std::stoull(arguments[1]);
+  for (const SoundingMode& mode : DrawModes(count, seed).modes) {
+    std::printf("%.17g %.17g %.17g\n", mode.natural_frequency_hz,
+                -std::log(1000.0) / mode.decay_rate_per_s, mode.coupling);
   }
   return EXIT_SUCCESS;
 }

@@ -6,8 +6,7 @@ Modes a core: how many modes one core renders in real time at 48 kHz, from CPU t
 fixed costs taken off. Because a shared core's speed changes from minute to minute, Carillon and Klank run
 in turns, and the medians over the turns are printed: of Carillon's modes, and of its ratio to Klank in each turn, with
 their range. All render the same modes: frequencies log-uniform from 20 Hz to 20 kHz, T60 log-uniform from 20 ms to
-60 s; none ever sleeps. Error: largest deviation from the closed form in double over the largest sample, and the same
-of root mean squares; of Klank against its own recurrence in double, so that only its rounding counts.
+60 s; none ever sleeps.
 """
 
 import argparse
@@ -19,11 +18,10 @@ import subprocess
 import sys
 import tempfile
 
-import measuring
 import supercollider_peer
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-PARTS = ("ringing", "directed", "accuracy", "flood", "latency")
+PARTS = ("ringing", "directed", "flood", "latency")
 
 
 def carillon(build, *arguments, most_target=None):
@@ -81,18 +79,6 @@ def directed(options, _folder):
     for result in carillon(options.build, "directed", options.seconds):
         row(result["what"], f"{result['objects']} x {result['modes']}", f"{result['harmonics']:,}",
             f"{result['load']:.2%}", f"{result['p99_block_ms']:.3f}")
-
-
-def accuracy(options, folder):
-    print("\n## Error over 10 s of the same 800 modes\n\n| what | worst, dB of the peak | root mean square, dB |\n"
-          "| --- | --- | --- |")
-    for result in carillon(options.build, "accuracy", 10):
-        row(f"Carillon {result['target']}, seven strikes", f"{result['worst_db']:.1f}", f"{result['rms_db']:.1f}")
-    modes = population(options.build, 800)
-    supercollider_peer.render(folder, modes, 1, 10)
-    sound = measuring.read_wave(folder / "klank.wav")
-    worst, mean = measuring.error_db(sound, supercollider_peer.exact(modes, 480000))
-    row("scsynth Klank, one impulse", f"{worst:.1f}", f"{mean:.1f}")
 
 
 def flood(options, _folder):
@@ -156,7 +142,7 @@ def main():
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            run = {"ringing": ringing, "directed": directed, "accuracy": accuracy, "flood": flood, "latency": latency}
+            run = {"ringing": ringing, "directed": directed, "flood": flood, "latency": latency}
             run[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0

@@ -2,14 +2,27 @@
 """scsynth's Klank, rendering offline: the synth definition and the score are written here, byte by byte, so that no
 client of it is needed."""
 
-import math
 import os
+import resource
+import statistics
 import struct
-
-import measuring
+import subprocess
 
 AUDIO_RATE = 2
 SCALAR_RATE = 0
+
+
+def cpu_seconds(command, **options):
+    """CPU seconds, of the user's side, that a command takes."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL, **options)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def rate(run, short_s, long_s, times=3):
+    """Seconds of sound a CPU second: run(seconds) returns CPU seconds; its fixed costs cancel out. The median."""
+    return statistics.median((long_s - short_s) / max(run(long_s) - run(short_s), 1e-6) for _ in range(times))
 
 
 def _name(text):
@@ -23,7 +36,7 @@ def _ugen(name, rate, inputs, output_count):
     return data + bytes([rate]) * output_count
 
 
-def synth_definition(modes, dynamic=False):
+def synth_definition(modes):
     """Impulse -> Klank -> Out. Constants first: 0, 1, then each mode's frequency, amplitude and ringing time."""
     constants = [0.0, 1.0] + [value for f, t60, a in modes for value in (f, a, t60)]
     constant = [(-1, i) for i in range(len(constants))]
@@ -68,7 +81,7 @@ def render(folder, modes, synth_count, seconds):
     score = _bundle(0, begin + start) + _bundle(seconds, [_message("/c_set", "ii", 0, 0)])
     path = folder / "score.osc"
     path.write_bytes(score)
-    return measuring.cpu_seconds(
+    return cpu_seconds(
         ["scsynth", "-N", path, "_", folder / "klank.wav", "48000", "WAV", "float", "-o", "1", "-i", "0", "-m",
          "262144", "-D", "0"], env={**os.environ, "QT_QPA_PLATFORM": "offscreen"})
 
@@ -76,20 +89,4 @@ def render(folder, modes, synth_count, seconds):
 def throughput(folder, population, synth_count=4):
     """Modes that one core renders in real time."""
     run = lambda seconds: render(folder, population, synth_count, seconds)
-    return len(population) * synth_count * measuring.rate(run, 1, 6)
-
-
-def exact(population, frame_count, sample_rate=48000):
-    """What Klank computes, in double: y(n) = x(n) + b1 y(n-1) + b2 y(n-2), output half of y(n) - y(n-2)... of each
-    mode, with its own coefficients."""
-    import numpy
-    from scipy import signal
-    impulse = numpy.zeros(frame_count)
-    impulse[0] = 1
-    total = numpy.zeros(frame_count)
-    for frequency, t60, amplitude in population:
-        omega = frequency * 2 * math.pi / sample_rate
-        r = math.exp(math.log(0.001) / (t60 * sample_rate))
-        cost = 2 * r * math.cos(omega) / (1 + r * r)
-        total += amplitude * 0.25 * signal.lfilter([1, 0, -1], [1, -2 * r * cost, r * r], impulse)
-    return total
+    return len(population) * synth_count * rate(run, 1, 6)
