@@ -1,42 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <ode/ode.h>
 
+#include <array>
 #include <memory>
 
+#include "client_sdk/adapters/ode_contacts.h"
 #include "client_sdk/examples/falls/fall.h"
-#include "client_sdk/examples/ode_world.h"
 
 namespace carillon::falls {
 namespace {
+
+/// Creates a world, once the process has ODE's own memory.
+dWorldID CreateWorld() {
+  static const bool initialized = dInitODE2(0) != 0;
+  static_cast<void>(initialized);
+  return dWorldCreate();
+}
 
 class OdeFall {
  public:
   OdeFall(const FallScene& scene, double step_s)
       : step_s_(step_s),
-        world_(step_s,
-               {.roughness_depth = scene.roughness_depth,
-                .irregularity_length_m = scene.irregularity_length_m},
-               [surface = examples::OdeSurface{.friction = scene.friction,
-                                               .restitution = scene.restitution}](
-                   dBodyID, dBodyID) { return surface; }) {
+        friction_(scene.friction),
+        restitution_(scene.restitution),
+        contacts_({.roughness_depth = scene.roughness_depth,
+                   .irregularity_length_m = scene.irregularity_length_m}) {
     const auto& [x, y, z] = scene.gravity_m_per_s2;
-    dWorldSetGravity(world_.world(), x, y, z);
-    world_.SoftenContacts();
+    dWorldSetGravity(world_, x, y, z);
+    // Contacts as soft as the manual of ODE advises for bodies that rest on one another.
+    dWorldSetCFM(world_, 1e-6);
+    dWorldSetContactSurfaceLayer(world_, 1e-4);
     uint32_t handle = 0;
     for (const Body& body : scene.bodies) Add(body, ++handle);
   }
+  OdeFall(const OdeFall&) = delete;
+  OdeFall& operator=(const OdeFall&) = delete;
+  ~OdeFall() {
+    dJointGroupDestroy(joints_);
+    dSpaceDestroy(space_);
+    dWorldDestroy(world_);
+  }
 
   v1::ContactStep Step() {
-    v1::ContactStep step = world_.Step(static_cast<double>(++step_count_) * step_s_);
-    world_.contacts().ReadPoses(step);
+    v1::ContactStep step;
+    step.set_time_s(static_cast<double>(++step_count_) * step_s_);
+    dSpaceCollide(space_, this, &OdeFall::Near);
+    dWorldStep(world_, step_s_);
+    contacts_.Read(step_s_, step);
+    dJointGroupEmpty(joints_);
+    contacts_.ReadPoses(step);
     return step;
   }
 
  private:
   void Add(const Body& body, uint32_t handle) {
     const bool is_plane = std::holds_alternative<Plane>(body.shape);
-    const dBodyID made = is_plane ? nullptr : dBodyCreate(world_.world());
-    const dSpaceID parts = dSimpleSpaceCreate(world_.space());  // the parts of one body do not meet
+    const dBodyID made = is_plane ? nullptr : dBodyCreate(world_);
+    const dSpaceID parts = dSimpleSpaceCreate(space_);  // the parts of one body do not meet
     dSpaceSetSublevel(parts, 1);
     std::visit([&](const auto& shape) { AddShape(shape, parts, made, body); }, body.shape);
     if (made == nullptr) return;
@@ -48,7 +68,7 @@ class OdeFall {
     dBodySetLinearVel(made, vx, vy, vz);
     const auto& [wx, wy, wz] = body.angular_velocity_rad_per_s;
     dBodySetAngularVel(made, wx, wy, wz);
-    if (!body.model.empty()) world_.contacts().AddObject(made, handle);
+    if (!body.model.empty()) contacts_.AddObject(made, handle);
   }
 
   static void AddShape(const Plane&, dSpaceID parts, dBodyID, const Body& body) {
@@ -80,8 +100,35 @@ class OdeFall {
     dBodySetMass(made, &mass);
   }
 
-  const double step_s_;
-  examples::OdeWorld world_;
+  static void Near(void* data, dGeomID a, dGeomID b) {
+    auto& self = *static_cast<OdeFall*>(data);
+    if (dGeomIsSpace(a) != 0 || dGeomIsSpace(b) != 0) return dSpaceCollide2(a, b, data, &Near);
+    if (dGeomGetBody(a) == dGeomGetBody(b)) return;
+    constexpr int kMost = 8;
+    std::array<dContactGeom, kMost> points;
+    const int count = dCollide(a, b, kMost, points.data(), sizeof(dContactGeom));
+    for (int i = 0; i < count; ++i) self.Join(a, b, points[static_cast<size_t>(i)]);
+  }
+
+  void Join(dGeomID a, dGeomID b, const dContactGeom& geometry) {
+    dContact contact{};
+    contact.geom = geometry;
+    contact.surface.mode = dContactBounce | dContactApprox1;
+    contact.surface.mu = friction_;
+    contact.surface.bounce = restitution_;
+    contact.surface.bounce_vel = kSlowestBounce_m_per_s;
+    const dJointID joint = dJointCreateContact(world_, joints_, &contact);
+    dJointAttach(joint, dGeomGetBody(a), dGeomGetBody(b));
+    contacts_.Add(joint, geometry);
+  }
+
+  static constexpr double kSlowestBounce_m_per_s = 0.05;
+
+  const double step_s_, friction_, restitution_;
+  const dWorldID world_ = CreateWorld();
+  const dSpaceID space_ = dSimpleSpaceCreate(nullptr);
+  const dJointGroupID joints_ = dJointGroupCreate(0);  ///< the contacts of the step
+  adapters::OdeContacts contacts_;
   int step_count_ = 0;
 };
 
