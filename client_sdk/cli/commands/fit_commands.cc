@@ -14,6 +14,7 @@
 #include "absl/strings/str_join.h"
 #include "client_sdk/cli/commands/find_model.h"
 #include "client_sdk/cli/commands/measured_modes.h"
+#include "client_sdk/cli/commands/mode_sound.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/wave_file.h"
 #include "client_sdk/fit/residual.h"
@@ -54,26 +55,15 @@ absl::StatusOr<fit::ModelLines> LinesOf(const v1::ModalModelSummary& model) {
       .complete_to_eigenvalue = header.complete_to_eigenvalue()};
 }
 
-/// The decay rate of each mode by radiation, for unit density and a speed sqrt(E/rho): rho_air
-/// Lambda c^2 I/(2 c_air). Empty if no transfer of the model is for about that speed.
+/// The decay rate of each mode by radiation, for unit density and a speed sqrt(E/rho). Empty if no
+/// transfer of the model is for about that speed.
 std::vector<double> RadiationOf(const v1::ModalModelSummary& model, double speed_m_per_s) {
-  constexpr double kFarthest = 0.05;  // as the daemon has it
-  const v1::TransferSummary* nearest = nullptr;
-  double least = kFarthest;
-  for (const v1::TransferSummary& transfer : model.transfers()) {
-    const v1::TransferHeader& header = transfer.header();
-    const double apart =
-        std::abs(std::log(speed_m_per_s / (header.speed_ratio() * header.sound_speed_m_per_s())));
-    if (apart > least || transfer.power_integrals_size() != model.eigenvalues_size()) continue;
-    nearest = &transfer, least = apart;
-  }
+  v1::Material unit;
+  unit.set_density_kg_per_m3(1);
+  unit.set_young_pa(speed_m_per_s * speed_m_per_s);
   std::vector<double> decays;
-  if (nearest == nullptr) return decays;
-  const double air =
-      nearest->header().air_density_kg_per_m3() / (2 * nearest->header().sound_speed_m_per_s());
-  for (int m = 0; m < model.eigenvalues_size(); ++m) {
-    decays.push_back(air * model.eigenvalues(m) * speed_m_per_s * speed_m_per_s *
-                     double{nearest->power_integrals(m)});
+  for (const ModeSound& mode : ModesOf(model, unit)) {
+    if (mode.radiation_decay_per_s) decays.push_back(*mode.radiation_decay_per_s);
   }
   return decays;
 }

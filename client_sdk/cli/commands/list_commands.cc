@@ -2,12 +2,10 @@
 //
 // The commands that show and end jobs, materials, reasons and scenes, and that write the examples.
 #include <algorithm>
-#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 
 #include "absl/strings/str_cat.h"
@@ -236,14 +234,8 @@ absl::Status DeleteScene(const client::Client& daemon, const std::string& text, 
 absl::Status WriteExample(const Example& example, const std::vector<double>& size_m,
                           const std::string& path, bool json) {
   const std::string file = path.empty() ? example.name + ".obj" : path;
-  std::ofstream out(file, std::ios::binary);
   const ExampleFile written = WrittenExample(example, size_m);
-  out << written.obj;
-  out.close();
-  if (!out) {
-    return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                   absl::StrCat(file, ": ", std::strerror(errno), "; choose another file"));
-  }
+  RETURN_IF_ERROR(WriteText(file, written.obj));
   if (json) {
     PrintJson({{"file", file},
                {"description", example.description},

@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
+#include "client_sdk/cli/output/output.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 
@@ -97,15 +98,6 @@ absl::Status WriteModes(const std::string& path, const std::vector<fit::Measured
                           mode.level_db, mode.signal_to_noise_db);
   }
   return WriteText(path, text);
-}
-
-absl::Status WriteText(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (file) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(path, " cannot be written; choose another file"));
 }
 
 }  // namespace carillon::cli

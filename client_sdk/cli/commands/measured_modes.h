@@ -31,7 +31,4 @@ absl::StatusOr<std::vector<fit::MeasuredMode>> ReadModes(const std::string& path
 /// Writes modes as ReadModes reads them. Errors: Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteModes(const std::string& path, const std::vector<fit::MeasuredMode>& modes);
 
-/// Writes a text file. Errors: Internal (OUTPUT_NOT_WRITABLE).
-absl::Status WriteText(const std::string& path, const std::string& text);
-
 }  // namespace carillon::cli

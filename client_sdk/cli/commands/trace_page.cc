@@ -18,6 +18,7 @@
 #include "absl/strings/string_view.h"
 #include "carillon/contact_trace.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/output/output.h"
 #include "client_sdk/interchange/model_records.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/child_process.h"
@@ -96,12 +97,8 @@ absl::Status WriteTracePage(const client::Client& daemon, const RenderedTrace& r
       wave, R"(","blows":")", absl::Base64Escape(rendered.blows.SerializeAsString()),
       R"(","summary":")", absl::Base64Escape(rendered.summary.SerializeAsString()),
       R"(","surfaces":{)", surfaces, "}}");
-  std::ofstream file(path, std::ios::binary);
-  file << page << "<script type=\"application/json\" id=\"trace\">" << text << "</script>\n";
-  file.close();
-  if (file) return absl::OkStatus();
-  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
-                 absl::StrCat(path, " cannot be written: name another file, or make room"));
+  return WriteText(path, absl::StrCat(page, "<script type=\"application/json\" id=\"trace\">", text,
+                                      "</script>\n"));
 }
 
 }  // namespace carillon::cli

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The command lines of `carillon material extract` and `carillon material fit`.
-#include "client_sdk/cli/options/fit_options.h"
 
 #include <CLI/CLI.hpp>
 #include <map>
@@ -9,6 +8,7 @@
 #include <string>
 
 #include "client_sdk/cli/commands/fit_commands.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/value_options.h"
 
 namespace carillon::cli {

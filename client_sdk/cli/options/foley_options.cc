@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/options/foley_options.h"
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -12,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "client_sdk/cli/commands/foley_command.h"
-#include "client_sdk/cli/options/render_options.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/value_options.h"
 #include "proto/cpp/striker_catalogue.h"
 

@@ -2,7 +2,6 @@
 //
 // The command lines of `carillon job`, `carillon material`, `carillon explain`, `carillon scene`
 // and `carillon example`.
-#include "client_sdk/cli/options/list_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -12,8 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/commands.h"
-#include "client_sdk/cli/options/fit_options.h"
-#include "client_sdk/cli/options/sound_options.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/value_options.h"
 
 namespace carillon::cli {

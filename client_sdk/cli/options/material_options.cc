@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/options/material_options.h"
 
 #include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
+
+#include "client_sdk/cli/options/options.h"
 
 namespace carillon::cli {
 namespace {

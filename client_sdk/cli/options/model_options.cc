@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The command line of `carillon model`.
-#include "client_sdk/cli/options/model_options.h"
 
 #include <unistd.h>
 
@@ -14,7 +13,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/commands.h"
-#include "client_sdk/cli/options/material_options.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/quantity.h"
 #include "client_sdk/cli/options/value_options.h"
 #include "proto/cpp/mesh_format.h"

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/options/render_options.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/clips/clips_command.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/value_options.h"
 
 namespace carillon::cli {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "client_sdk/cli/options/sound_options.h"
 
 #include <CLI/CLI.hpp>
 #include <memory>
@@ -8,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/options/options.h"
 #include "client_sdk/cli/options/value_options.h"
 
 namespace carillon::cli {

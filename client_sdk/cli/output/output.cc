@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -22,6 +23,15 @@ absl::Status FlushOutput() {
                  absl::StrCat("stdout: ", why,
                               "; a part of the output is lost: send it to a file or a pipe that "
                               "takes it"));
+}
+
+absl::Status WriteText(const std::string& path, absl::string_view text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (file) return absl::OkStatus();
+  return Refusal(absl::StatusCode::kInternal, "OUTPUT_NOT_WRITABLE",
+                 absl::StrCat(path, ": ", std::strerror(errno), "; choose another file"));
 }
 
 int Report(const absl::Status& status, bool json) {

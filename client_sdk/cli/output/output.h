@@ -34,6 +34,9 @@ void PrintJson(const google::protobuf::Message& message);
 /// Prints an object with the members to stdout as one line of JSON; see MembersJson.
 void PrintJson(const std::vector<JsonMember>& members);
 
+/// Writes a file. Errors: Internal (OUTPUT_NOT_WRITABLE).
+absl::Status WriteText(const std::string& path, absl::string_view text);
+
 /// Prints to stderr that a list has no entry of the kind `noun`, so that stdout stays empty.
 void PrintNothing(absl::string_view noun);
 
