@@ -2,6 +2,8 @@
 #include "server/decomposition/decomposition_queue.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <utility>
 
@@ -12,13 +14,32 @@
 #include "server/decomposition/job/decomposition_request.h"
 #include "server/decomposition/job/job_rules.h"
 #include "server/decomposition/job/stored_model.h"
-#include "server/decomposition/queue_refusals.h"
 
 namespace carillon {
 namespace {
 
 // A daemon that was killed this often while a job ran may have been killed because of the job.
 constexpr uint32_t kMostStarts = 10;
+
+absl::Status JobNotFound(const std::string& digest) {
+  return Refusal(absl::StatusCode::kNotFound, "JOB_NOT_FOUND",
+                 absl::StrCat("no job is named jobs/", digest, ": create the modal model again"));
+}
+
+absl::Status QueueFull(size_t count, double retry_after_s) {
+  const int64_t seconds = std::max<int64_t>(1, std::llround(retry_after_s));
+  absl::Status status =
+      Refusal(absl::StatusCode::kResourceExhausted, "QUEUE_FULL",
+              absl::StrCat(count, " decompositions wait already: try again in ", seconds, " s"));
+  AddFigure(status, "retry_after_s", absl::StrCat(seconds));
+  return status;
+}
+
+absl::Status ClientQueueFull(size_t count, size_t whole) {
+  return Refusal(absl::StatusCode::kResourceExhausted, "CLIENT_LIMIT_REACHED",
+                 absl::StrCat(count, " decompositions of this client wait already, its share of ",
+                              whole, ": wait until some have run"));
+}
 
 /// The filter for the stored states: running jobs are stored as queued ones.
 JobFilter AsStored(JobFilter filter) {
@@ -403,11 +424,17 @@ absl::StatusOr<std::unique_ptr<JobWatch>> DecompositionQueue::Watch(
     first = jobs_->CompleteWatch(digest, std::move(first), *stored);
   }
   first.Tell();
-  return MakeJobWatch(jobs_, digest, std::move(watcher));
+  return std::make_unique<JobWatch>([jobs = std::weak_ptr(jobs_), digest, watcher] {
+    watcher->Close();
+    if (const auto active = jobs.lock()) active->Forget(digest, watcher);
+  });
 }
 
 std::unique_ptr<JobWatch> DecompositionQueue::WatchAll(JobSink& sink) {
-  return MakeJobWatch(jobs_, sink);
+  jobs_->WatchAll(sink);
+  return std::make_unique<JobWatch>([jobs = std::weak_ptr(jobs_), &sink] {
+    if (const auto active = jobs.lock()) active->Forget(sink);
+  });
 }
 
 absl::StatusOr<v1::Job> DecompositionQueue::FindStored(const std::string& digest) {

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
-#include <string>
-
-#include "server/decomposition/active_jobs.h"
-#include "server/decomposition/job_sink.h"
-#include "server/decomposition/watcher.h"
+#include <functional>
+#include <utility>
 
 namespace carillon {
 
@@ -15,14 +11,13 @@ namespace carillon {
 /// the function takes. A watch may outlive the queue.
 class JobWatch {
  public:
-  virtual ~JobWatch() = default;
+  explicit JobWatch(std::function<void()> end) : end_(std::move(end)) {}
+  JobWatch(const JobWatch&) = delete;
+  JobWatch& operator=(const JobWatch&) = delete;
+  ~JobWatch() { end_(); }
+
+ private:
+  const std::function<void()> end_;
 };
-
-/// Returns the watch of a job whose watcher is registered already.
-std::unique_ptr<JobWatch> MakeJobWatch(const std::shared_ptr<ActiveJobs>& jobs, std::string digest,
-                                       std::shared_ptr<Watcher> watcher);
-
-/// Registers a sink of all jobs, and returns its watch. `sink` must outlive the watch.
-std::unique_ptr<JobWatch> MakeJobWatch(const std::shared_ptr<ActiveJobs>& jobs, JobSink& sink);
 
 }  // namespace carillon
