@@ -6,15 +6,14 @@
 
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -32,18 +31,16 @@ namespace {
 using State = DeviceReport::State;
 
 constexpr int kPeriod_ms = 20;
-constexpr std::chrono::seconds kEndLimit(1);
+constexpr unsigned kEndLimit_s = 1;
 
-/// Ends this process a second after the daemon has closed its end of the socket, also if a call of
-/// PortAudio waits for ever.
+/// Lets the kernel end this process a second after the daemon, also if a call of PortAudio waits
+/// for ever. Before its own end the daemon kills a process that it has no use for.
 void EndWithDaemon() {
-  std::thread([] {
-    pollfd daemon{kDaemonSocket, POLLRDHUP, 0};
-    while (poll(&daemon, 1, -1) <= 0) {
-    }
-    std::this_thread::sleep_for(kEndLimit);
-    _exit(EXIT_FAILURE);
-  }).detach();
+  signal(SIGALRM, SIG_DFL);
+  signal(SIGUSR1, [](int /*number*/) { alarm(kEndLimit_s); });
+  prctl(PR_SET_PDEATHSIG, SIGUSR1);
+  pollfd daemon{kDaemonSocket, POLLRDHUP, 0};
+  if (poll(&daemon, 1, 0) > 0) alarm(kEndLimit_s);  // the daemon died before the line above
 }
 
 void Send(const DeviceReport& report) {

@@ -9,4 +9,7 @@ namespace carillon {
 /// than jemalloc, as a sanitizer brings one.
 uint64_t AllocatedBytes();
 
+/// Gives memory that was freed more than a second ago back to the system.
+void GiveMemoryBack();
+
 }  // namespace carillon

@@ -30,6 +30,7 @@
 #include "server/daemon/daemon_log.h"
 #include "server/daemon/daemon_metrics.h"
 #include "server/daemon/data_directory.h"
+#include "server/daemon/heap.h"
 #include "server/daemon/options.h"
 #include "server/daemon/room_settings.h"
 #include "server/daemon/stop_signals.h"
@@ -194,10 +195,11 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
   guard.CompleteStart();
   AnnounceReady(rooms.server);
   Watchdog watchdog(rooms.output);
-  RepeatedWork reports{.period = watchdog.period(), .work = {}};
-  // systemd listens.
-  if (std::getenv("NOTIFY_SOCKET") != nullptr) reports.work = [&] { watchdog.Report(); };
-  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo, reports);
+  const RepeatedWork repeated{.period = watchdog.period(), .work = [&] {
+                                watchdog.Report();
+                                GiveMemoryBack();
+                              }};
+  WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo, repeated);
   guard.BeginStop();
   sd_notify(0, "STOPPING=1");
   rooms.output.FadeOut();

@@ -119,9 +119,8 @@ void WaitForStop(const std::function<void()>& reload, const StopLog& log,
                         .tv_nsec = std::chrono::nanoseconds(repeated.period - seconds).count()};
   int received = 0;
   while (received <= 0) {
-    received =
-        repeated.work ? sigtimedwait(&signals, nullptr, &period) : sigwaitinfo(&signals, nullptr);
-    if (received < 0 && errno == EAGAIN && repeated.work) repeated.work();
+    received = sigtimedwait(&signals, nullptr, &period);
+    if (received < 0 && errno == EAGAIN) repeated.work();
     if (received != SIGHUP) continue;
     reload();
     received = sigtimedwait(&stops, nullptr, &kReloadPeriod);

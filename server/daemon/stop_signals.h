@@ -49,7 +49,7 @@ class StopGuard {
 /// Work that is done again and again while WaitForStop waits.
 struct RepeatedWork {
   std::chrono::microseconds period;
-  std::function<void()> work;  ///< may be empty
+  std::function<void()> work;
 };
 
 /// Returns on SIGINT, SIGTERM and SIGQUIT. SIGHUP calls `reload`, but at most once a second:
