@@ -15,11 +15,11 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client_sdk/cpp/internal/authorize.h"
 #include "client_sdk/cpp/internal/block_reader.h"
 #include "client_sdk/cpp/internal/contact_stream_call.h"
 #include "client_sdk/cpp/internal/performance_call.h"
@@ -31,6 +31,23 @@
 
 namespace carillon::client {
 namespace {
+
+/// Whether the text can be sent as metadata: printable ASCII.
+bool IsSendable(const std::string& token) {
+  return std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c <= '~'; });
+}
+
+/// Adds the token to a call of the daemon at `server`. Adds nothing if the token is empty or is not
+/// sendable. gRPC ends the call, before the token is sent, if another machine could read it: if the
+/// connection has no TLS and leaves this machine (FromRpc, TLS_REQUIRED).
+void Authorize(grpc::ClientContext& context, const std::string& server, const std::string& token) {
+  if (token.empty() || !IsSendable(token)) return;
+  if (IsOnThisMachine(server)) {
+    context.AddMetadata("authorization", "Bearer " + token);
+  } else {
+    context.set_credentials(grpc::AccessTokenCredentials(token));
+  }
+}
 
 std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ConnectOptions& options) {
   if (options.tls_roots_pem.empty()) return grpc::InsecureChannelCredentials();

@@ -56,13 +56,4 @@ absl::Status ReadTransferRecords(const std::string& file,
   return ReadDelimited<v1::TransferRecord>(file, sink);
 }
 
-bool HoldsTransfer(const std::string& file) {
-  bool holds = false;
-  ReadTransferRecords(file, [&](const v1::TransferRecord& first) {
-    holds = first.header().air_density_kg_per_m3() > 0;
-    return absl::CancelledError();  // no further record is read
-  }).IgnoreError();
-  return holds;
-}
-
 }  // namespace carillon::client

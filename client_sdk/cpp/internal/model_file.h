@@ -23,7 +23,4 @@ absl::Status ReadRecords(const std::string& file,
 absl::Status ReadTransferRecords(const std::string& file,
                                  absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink);
 
-/// Whether a file begins with the header of a transfer. No other header states the density of air.
-bool HoldsTransfer(const std::string& file);
-
 }  // namespace carillon::client

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -13,7 +14,6 @@
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
 #include "server/api/call/exception_barrier.h"
-#include "server/api/call/file_pieces.h"
 #include "server/api/call/send_call.h"
 #include "server/api/call/unary_call.h"
 #include "server/api/convert/resource_name.h"
@@ -22,6 +22,25 @@
 
 namespace carillon {
 namespace {
+
+/// A file, read piece by piece for a stream.
+class FilePieces {
+ public:
+  /// The file may be removed once it is open.
+  void Open(const std::filesystem::path& path) { file_.open(path, std::ios::binary); }
+
+  /// Fills `data` with the next piece.
+  Supply Next(std::string& data) {
+    constexpr size_t kPieceBytes = 1 << 20;
+    data.resize(kPieceBytes);
+    file_.read(data.data(), static_cast<std::streamsize>(data.size()));
+    data.resize(static_cast<size_t>(file_.gcount()));
+    return data.empty() ? Supply::kEnd : Supply::kMessage;
+  }
+
+ private:
+  std::ifstream file_;
+};
 
 v1::GetDatabaseStatsResponse ToProto(const DatabaseStats& stats) {
   v1::GetDatabaseStatsResponse proto;
