@@ -103,27 +103,6 @@ TEST_F(DecompositionQueueTest, ABodyOfUnclearUnitIsTriedAgainWhereTheRequestStat
   EXPECT_EQ(RunCount(), 2U);
 }
 
-TEST_F(DecompositionQueueTest, AWorkerThatIsEndedFromOutsideTwiceFailsButNotForEver) {
-  for (const char* signal : {"TERM", "KILL"}) {
-    std::filesystem::remove(folder_ / "runs");
-    MakeQueue(absl::StrCat(kCount, "kill -", signal, " $$"));
-    EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED") << signal;
-    EXPECT_EQ(RunCount(), 2U) << "no other way of computing";
-  }
-  MakeQueue(kSucceed);
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
-}
-
-TEST_F(DecompositionQueueTest, ACrashInEveryWayIsRememberedAcrossARestart) {
-  MakeQueue(absl::StrCat(kCount, "kill -SEGV $$"));
-  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).error().reason(), "WORKER_CRASHED");
-  EXPECT_EQ(RunCount(), kWayCount);
-  Open("carillon.db");
-  MakeQueue(absl::StrCat(kCount, kSucceed));
-  EXPECT_EQ(Submit(Request(20'000)).error().reason(), "WORKER_CRASHED");
-  EXPECT_EQ(RunCount(), kWayCount);
-}
-
 TEST_F(DecompositionQueueTest, AJobUnderWhichTheDaemonDiesAgainAndAgainIsGivenUpUntilAskedAgain) {
   const auto request = ResolveRequest(Request(20'000));
   const std::string digest = RequestDigest(*request);

@@ -60,13 +60,5 @@ TEST_F(JobWatchTest, AWatchMayEndItselfAndIsNotCalledAgain) {
   EXPECT_EQ(calls_after_end, 0);
 }
 
-TEST_F(JobWatchTest, AWatchOfAnEndedJobTellsItsEndAtOnce) {
-  MakeQueue(kSucceed);
-  const v1::Job job = SubmitAndAwaitEnd(Request(20'000));
-  Diary diary;
-  const auto watch = Watch(job, diary);
-  EXPECT_THAT(diary.states(), ElementsAre(v1::JOB_STATE_SUCCEEDED));
-}
-
 }  // namespace
 }  // namespace carillon

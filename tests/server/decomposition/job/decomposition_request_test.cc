@@ -33,25 +33,6 @@ std::string Digest(const Request& request) {
   return resolved.ok() ? RequestDigest(*resolved) : "";
 }
 
-TEST(DecompositionRequest, TheCanonicalTextIsTheDocumentedOne) {
-  Request request = Aluminum();
-  request.mutable_settings()->set_poisson_ratio(0.33);
-  request.mutable_settings()->set_metres_per_unit(0.001);
-  request.mutable_settings()->mutable_mesh()->set_keep_surface(true);
-  EXPECT_EQ(CanonicalText(*ResolveRequest(request)),
-            "carillon-decomposition 1\n"
-            "mesh " +
-                Sha256Hex("mesh") +
-                "\n"
-                "format obj\n"
-                "poisson_1e-4 3300\n"
-                "element quadratic\n"
-                "mass consistent\n"
-                "metres_per_unit 0.001\n"
-                "keep_surface yes\n"
-                "target_node_count 0\n");
-}
-
 // The text as every earlier version made it: a model that is stored keeps its name.
 TEST(DecompositionRequest, ModelsKeepTheirNames) {
   Request request = Aluminum();

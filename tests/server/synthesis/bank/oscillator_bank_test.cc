@@ -77,13 +77,6 @@ TEST_P(OnEveryTarget, ProjectsAnImpulseOntoTheShapesOfItsTriangle) {
   EXPECT_LT(20 * std::log10(error / peak), -100);
 }
 
-TEST_P(OnEveryTarget, TheSameStrikesGiveTheSameBits) {
-  const SoundingModes sounding = MakeWideModes();
-  OscillatorBank one(sounding, MakeUniformShapes(37), {}), two(sounding, MakeUniformShapes(37), {});
-  EXPECT_EQ(Ring(one, MakeUnitImpulse(), 4096, 5, 0.5F),
-            Ring(two, MakeUnitImpulse(), 4096, 5, 0.5F));
-}
-
 TEST(OscillatorBank, PitchAndDecayAreThoseOfTheModes) {
   const double frequency_hz = 1234.5, sigma = -7.5;
   OscillatorBank bank({.modes = {MakeMode(0, frequency_hz, sigma, 100)}}, MakeUniformShapes(1), {});
