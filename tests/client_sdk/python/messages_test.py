@@ -104,6 +104,9 @@ class RefusalsTest(MessagesTest):
             self.refused(expected, made, contacts=given)
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
         self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+        for wrong in (-1, 1e-4, 1e4, float("nan"), "slow"):
+            self.refused(f"time_scale is {wrong!r}; it must be simulation time over time of the sound, 0.001 to 1000, "
+                         "or 0 in a pause", made, time_scale=wrong)
 
     def test_one_place_has_the_same_coordinates_for_both_objects_in_the_frame_of_the_scene_alone(self):
         given = carillon.Contacts(1, [(1, 2, 3)], [IMPULSE], second_objects=2)
