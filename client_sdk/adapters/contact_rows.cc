@@ -95,10 +95,12 @@ void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {
 }
 
 void ContactRows::Describe(const ContactSide& silent, v1::HertzContact& hertz) const {
-  // A striker of this mass changes the reduced mass of no real body.
-  constexpr double kImmovableMass_kg = 1e6;
+  // A striker of this mass changes the reduced mass of no real body, and one of this radius is
+  // flat.
+  constexpr double kImmovableMass_kg = 1e6, kFlatRadius_m = 1;
   hertz.set_striker(settings_.striker);
   hertz.set_striker_mass_kg(silent.mass_kg.value_or(kImmovableMass_kg));
+  if (!silent.mass_kg) hertz.set_striker_radius_m(kFlatRadius_m);
 }
 
 void ContactRows::AppendPose(const void* body, const Vector& position_m,

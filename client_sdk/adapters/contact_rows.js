@@ -11,8 +11,8 @@ const tangential = (v, normal) => minus(v, times(normal, dot(v, normal)));
 const length = (v) => Math.sqrt(dot(v, v)); // much quicker than Math.hypot
 const ZERO = [0, 0, 0];
 
-// A striker of this mass changes the reduced mass of no real body.
-const IMMOVABLE_KG = 1e6;
+// A striker of this mass changes the reduced mass of no real body, and one of this radius is flat.
+const FLOOR = { strikerMassKg: 1e6, strikerRadiusM: 1 };
 
 /**
  * A body as an adapter describes it: { key, massKg, centre, velocity, angularVelocity }, all but `key` absent where the
@@ -92,7 +92,8 @@ class ContactRows {
     if (other !== undefined) {
       row.second = { object: other, point: pointOnSecond };
     } else {
-      row.striker = { striker: this.settings.striker ?? '', strikerMassKg: second.massKg ?? IMMOVABLE_KG };
+      const moves = second.massKg !== undefined;
+      row.striker = { striker: this.settings.striker ?? '', ...(moves ? { strikerMassKg: second.massKg } : FLOOR) };
     }
     return [row];
   }

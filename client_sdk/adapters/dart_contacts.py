@@ -4,17 +4,17 @@
 import carillon
 import numpy
 
-# A striker of this mass changes the reduced mass of no real body.
-IMMOVABLE_KG = 1e6
+# A striker of this mass changes the reduced mass of no real body, and one of this radius is flat.
+FLOOR = {"mass_kg": 1e6, "radius_m": 1}
 
 
 class DartContacts:
     """What a step of a stream or trace takes: `trace.step(time, **contacts.read(world))`. Open the stream or trace with
-    frame="scene". `striker` is the substance of bodies without a sound, which count as immovable. `roughness_depth` and
+    frame="scene". `striker` is the substance of bodies without a sound, which count as immovable and flat. `roughness_depth` and
     `irregularity_length` (metres) let slides and rolls be heard, as carillon.Contacts says."""
 
     def __init__(self, *, striker="", roughness_depth=0.0, irregularity_length=0.0):
-        self._settings = {"striker": carillon.striker(striker, mass_kg=IMMOVABLE_KG),
+        self._settings = {"striker": carillon.striker(striker, **FLOOR),
                           "roughness_depth": roughness_depth, "irregularity_length": irregularity_length}
         self._objects = {}  # by the key of a body: the body, its handle, and its pose after the step before
         self._partners = {}

@@ -6,8 +6,8 @@
 namespace carillon::motion {
 namespace {
 
-/// A striker of this mass changes the reduced mass of no real body, kg.
-constexpr double kImmovableMassKg = 1e6;
+/// A striker of this mass changes the reduced mass of no real body, and one of this radius is flat.
+constexpr double kImmovableMassKg = 1e6, kFlatRadiusM = 1;
 
 void Set(v1::Vec3& to, const Vector& from) {
   to.set_x(from.x());
@@ -103,6 +103,7 @@ class StepMaker {
       const double mass_kg = motion_.bodies[second.body].mass_kg;
       row->mutable_hertz()->set_striker(settings_.silent_striker);
       row->mutable_hertz()->set_striker_mass_kg(mass_kg > 0 ? mass_kg : kImmovableMassKg);
+      if (!(mass_kg > 0)) row->mutable_hertz()->set_striker_radius_m(kFlatRadiusM);
       return row;
     }
     row->mutable_second()->set_object(settings_.handles[second.body]);

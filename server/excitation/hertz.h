@@ -14,6 +14,8 @@ struct HertzContact {
   std::optional<double> striker_young_pa = std::nullopt;
   std::optional<double> striker_poisson_ratio = std::nullopt;
   std::optional<double> striker_mass_kg = std::nullopt;
+  /// Whether striker_mass_kg is that of the catalogue's entry, which the client only named.
+  bool striker_mass_is_named = false;
   std::optional<double> striker_radius_m = std::nullopt;
 };
 

@@ -26,9 +26,9 @@ double AreaM2(std::span<const std::array<float, 3>> vertices,
 
 namespace {
 
-/// Calls `take` with six times the signed volume of each triangle's tetrahedron, and with the sum
-/// of its corners. The tetrahedra stand on a vertex of the surface, because rounding errors are
-/// smallest there; that vertex is the origin.
+/// Calls `take` with six times the signed volume of each triangle's tetrahedron, and with the
+/// corners of the triangle and their sum. The tetrahedra stand on a vertex of the surface, because
+/// rounding errors are smallest there; that vertex is the origin.
 template <typename Take>
 void ForEachTetrahedron(std::span<const std::array<float, 3>> vertices,
                         std::span<const std::array<uint32_t, 3>> triangles, const Take& take) {
@@ -44,7 +44,8 @@ void ForEachTetrahedron(std::span<const std::array<float, 3>> vertices,
                c = from_origin(triangle[2]);
     take(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
              a[2] * (b[0] * c[1] - b[1] * c[0]),
-         std::array<double, 3>{a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]});
+         std::array<std::array<double, 3>, 4>{
+             {a, b, c, {a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]}}});
   }
 }
 
@@ -64,7 +65,7 @@ std::array<double, 3> CentreM(std::span<const std::array<float, 3>> vertices,
   std::array<double, 3> moment{}, centre{};
   ForEachTetrahedron(vertices, triangles, [&](double six_volumes, const auto& corners) {
     sum += six_volumes;
-    for (size_t i = 0; i < 3; ++i) moment[i] += six_volumes * corners[i] / 4;
+    for (size_t i = 0; i < 3; ++i) moment[i] += six_volumes * corners[3][i] / 4;
   });
   for (size_t i = 0; i < 3; ++i) {
     if (sum != 0) {
@@ -76,6 +77,35 @@ std::array<double, 3> CentreM(std::span<const std::array<float, 3>> vertices,
     }
   }
   return centre;
+}
+
+std::array<std::array<double, 3>, 3> InertiaM5(std::span<const std::array<float, 3>> vertices,
+                                               std::span<const std::array<uint32_t, 3>> triangles) {
+  // The integrals of 1, x_i and x_i x_j over the body.
+  double volume = 0;
+  std::array<double, 3> moment{};
+  std::array<std::array<double, 3>, 3> second{}, inertia{};
+  ForEachTetrahedron(vertices, triangles, [&](double six_volumes, const auto& corners) {
+    volume += six_volumes / 6;
+    for (size_t i = 0; i < 3; ++i) {
+      moment[i] += six_volumes / 24 * corners[3][i];
+      for (size_t j = 0; j < 3; ++j) {
+        for (const auto& corner : corners)
+          second[i][j] += six_volumes / 120 * corner[i] * corner[j];
+      }
+    }
+  });
+  if (volume == 0) return inertia;
+  const double sign = volume > 0 ? 1 : -1;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j) {
+      const double about_centre = sign * (second[i][j] - moment[i] * moment[j] / volume);
+      inertia[i][j] -= about_centre;
+      if (i != j) continue;
+      for (size_t k = 0; k < 3; ++k) inertia[k][k] += about_centre;
+    }
+  }
+  return inertia;
 }
 
 double ExtentM(std::span<const std::array<float, 3>> vertices) {

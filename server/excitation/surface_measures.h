@@ -17,6 +17,11 @@ double VolumeM3(std::span<const std::array<float, 3>> vertices,
 std::array<double, 3> CentreM(std::span<const std::array<float, 3>> vertices,
                               std::span<const std::array<uint32_t, 3>> triangles);
 
+/// Returns the tensor of inertia about its centre of mass of the homogeneous body of density 1
+/// inside a closed surface, m^5. It is zero for a surface that encloses no volume.
+std::array<std::array<double, 3>, 3> InertiaM5(std::span<const std::array<float, 3>> vertices,
+                                               std::span<const std::array<uint32_t, 3>> triangles);
+
 /// Returns the area of the triangles, m^2.
 double AreaM2(std::span<const std::array<float, 3>> vertices,
               std::span<const std::array<uint32_t, 3>> triangles);

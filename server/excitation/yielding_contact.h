@@ -10,7 +10,7 @@ namespace carillon {
 /// The collision of a blow whose duration is not stated.
 struct Collision {
   double reduced_mass_kg = 0;  ///< zero: the blow has a stated duration
-  /// The approach speed, m/s, if the client stated it. It is otherwise J/(2 m), as for Hertz.
+  /// The approach speed, m/s, if the client stated it or poses tell it. It is otherwise J/(2 m).
   double stated_speed_m_per_s = 0;
 };
 

@@ -35,6 +35,9 @@ constexpr double kFeebleMPerS2 = 2.5 * 9.81;
 constexpr double kSettling = 1.5;
 /// Part of the impulses of a load that rounding may leave of it.
 constexpr double kRounding = 1e-9;
+/// The speed of a blow, as a part of J/m, lies between these limits, because J is (1 + e) m v with
+/// a restitution e of 0 to 1. The limits leave room for engines whose masses differ a little.
+constexpr double kLeastOfSpeed = 0.4, kMostOfSpeed = 2;
 /// A contact that is lost for a shorter time than this flickers, seconds.
 constexpr double kLostS = 0.01;
 /// A load continues with another partner if the cosine of its change of direction is greater than
@@ -75,6 +78,7 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
   if (!time_s_) first_time_s_ = time_s;
   gap_s_ = since_s;
   step_s_ = follows_ && since_s > 0 ? since_s : nominal_step_s_;
+  poses_.Begin(time_s, follows_);
   previous_time_s_ = std::exchange(time_s_, time_s);
   return events_;
 }
@@ -126,12 +130,16 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
                                        .mass_kg = on_body.mass_kg,
                                        .serial = on_body.serial,
                                        .impulse = on_body.impulse(),
+                                       .point_m = on_body.point_m,
+                                       .turn = on_body.turn,
                                        .collision = on_body.collision};
   }
   added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
   added.roughness = touch.roughness;
   added.time_offset_s = touch.time_offset_s;
   added.duration_follows_impulse = impulse.duration_follows_impulse;
+  added.mass_is_stated = impulse.mass_is_stated;
+  added.striker_per_kg = impulse.striker_per_kg;
 }
 
 BlowGatherer::Events BlowGatherer::End() {
@@ -374,10 +382,32 @@ bool BlowGatherer::Flickers(Blow& blow, double force_newtons) {
   return returns;
 }
 
+double BlowGatherer::ApproachSpeed(std::span<const PairTouch> touches) const {
+  double sum = 0, weights = 0;
+  for (const PairTouch& touch : touches) {
+    std::array<RecentPoses::Ray, 2> rays{};
+    for (size_t i = 0; i < touch.part_count; ++i) {
+      const Part& part = touch.parts[i];
+      rays[i] = {.handle = part.handle, .point_m = part.point_m};
+      const auto& impulse = part.impulse.impulse_newton_seconds;
+      for (size_t axis = 0; axis < impulse.size(); ++axis) {
+        rays[i].direction[axis] = double{impulse[axis]} / touch.magnitude;
+      }
+    }
+    const std::optional<double> speed =
+        poses_.ApproachSpeed(std::span(rays).first(touch.part_count));
+    if (!speed) return 0;
+    sum += touch.magnitude * *speed;
+    weights += touch.magnitude;
+  }
+  return weights > 0 ? std::max(sum / weights, 0.0) : 0;
+}
+
 void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) const {
   Blow& blow = pair.blow;
   if (!blow.begun()) {
     blow.begin_s = *time_s_;
+    blow.approach_m_per_s = ApproachSpeed(pair.touches);
     blow.lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS;
     blow.strongest = 0;
     blow.touches.clear();
@@ -432,15 +462,45 @@ void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
     whole += magnitude;
     squares += magnitude * magnitude;
   }
+  const Collision collision = CollisionOf(blow, impulse);
   for (const PairTouch& touch : blow.touches) {
     const BlowShares shares{.scale = impulse / whole,
                             .of_blow = touch.magnitude / whole,
-                            .of_mass = squares / (whole * whole)};
+                            .of_mass = squares / (whole * whole),
+                            .mass_kg = collision.reduced_mass_kg,
+                            .speed_m_per_s = collision.stated_speed_m_per_s};
     for (size_t i = 0; i < touch.part_count; ++i) {
       events_.push_back(PartOfBlow(touch, i, shares));
       events_.back().time_s = TimeOf(pair.bodies, blow, touch);
     }
   }
+}
+
+Collision BlowGatherer::CollisionOf(const Blow& blow, double impulse) {
+  const PairTouch& first = blow.touches.front();
+  double whole = 0, masses = 0;
+  for (const PairTouch& touch : blow.touches) {
+    whole += touch.magnitude;
+    masses += touch.magnitude * touch.parts[0].collision.reduced_mass_kg;
+  }
+  double per_kg = first.striker_per_kg.value_or(0);
+  for (size_t i = 0; i < first.part_count; ++i) {
+    Vector3 push{}, turn{};
+    for (const PairTouch& touch : blow.touches) {
+      for (size_t axis = 0; axis < push.size(); ++axis) {
+        push[axis] += double{touch.parts[i].impulse.impulse_newton_seconds[axis]};
+        turn[axis] += touch.parts[i].turn[axis];
+      }
+    }
+    const double mass = first.parts[i].mass_kg;
+    const double moved_per_kg = (Dot(push, push) / mass + Dot(turn, turn)) / (whole * whole);
+    per_kg += std::max(moved_per_kg, 1 / mass);  // impulses that cancel move nothing
+  }
+  const double speed = blow.approach_m_per_s;
+  if (speed >= kLeastOfSpeed * impulse * per_kg && speed <= kMostOfSpeed * impulse * per_kg) {
+    return {.reduced_mass_kg = 1 / per_kg, .stated_speed_m_per_s = speed};
+  }
+  return {.reduced_mass_kg = first.striker_per_kg ? 1 / per_kg : masses / whole};
 }
 
 uint32_t BlowGatherer::PlaceOf(const PairTouch& touch) {
@@ -463,19 +523,28 @@ double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTo
 /// Returns the impulse on the first or the second object of a touch.
 ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which,
                                     const BlowShares& shares) {
+  const Part& part = touch.parts[which];
+  Collision collision = part.collision;
   double longer = 1;
-  Collision collision = touch.parts[which].collision;
-  if (collision.reduced_mass_kg > 0) {
-    longer *= std::pow(shares.of_mass, kMassPower);
-    collision.reduced_mass_kg *= shares.of_blow;
-  }
-  if (touch.duration_follows_impulse) {
+  if (collision.reduced_mass_kg > 0 && std::isfinite(collision.reduced_mass_kg)) {
+    const double mass = touch.mass_is_stated ? collision.reduced_mass_kg : shares.mass_kg;
+    longer *= std::pow(mass / collision.reduced_mass_kg * shares.of_mass, kMassPower);
+    if (touch.duration_follows_impulse) {
+      // The duration was computed for the speed of the touch alone.
+      const double alone = touch.magnitude / (2 * collision.reduced_mass_kg);
+      const double elastic = shares.scale * touch.magnitude / shares.of_blow / (2 * mass);
+      const double speed = shares.speed_m_per_s > 0 ? shares.speed_m_per_s : elastic;
+      longer *= std::pow(speed / alone, kDurationPower);
+      collision.stated_speed_m_per_s = shares.speed_m_per_s;
+    }
+    collision.reduced_mass_kg = mass * shares.of_blow;
+  } else if (touch.duration_follows_impulse) {
     longer *= std::pow(shares.scale / shares.of_blow, kDurationPower);
   }
-  const Part& part = touch.parts[which];
   SurfaceImpulse impulse = part.impulse;
   impulse.impulse_newton_seconds = Scaled(impulse.impulse_newton_seconds, shares.scale);
-  impulse.pulse = impulse.pulse.Lasting(static_cast<float>(impulse.pulse.duration_s() * longer));
+  impulse.pulse = impulse.pulse.Lasting(
+      static_cast<float>(std::min(impulse.pulse.duration_s() * longer, kLongestContactS)));
   const bool of_two = touch.part_count == touch.parts.size();
   return {.handle = part.handle,
           .serial = part.serial,

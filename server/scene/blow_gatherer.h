@@ -15,6 +15,7 @@
 #include "server/excitation/load_tracker.h"
 #include "server/scene/body_impulses.h"
 #include "server/scene/object_contact.h"
+#include "server/scene/recent_poses.h"
 #include "server/scene/step_intervals.h"
 #include "server/synthesis/schedule/mixer_event.h"
 
@@ -71,7 +72,9 @@ struct ForceEvent {
 /// The contacts of a pair that strike in one step share the impact: where a face lands flat, all of
 /// its corners meet the floor at the same speed, and each brings a part of the mass to rest. All
 /// get the duration of a contact with that part, the mean of the places' parts of the impulse
-/// weighted by these, and with the speed of the whole blow. Contacts at one place count as one.
+/// weighted by these, of the mass that all impulses meet together. Contacts at one place count as
+/// one. The speed is that at which the places approached before the blow, if poses tell it and the
+/// impulse fits it, and otherwise that of an elastic collision.
 ///
 /// A body that slides from one partner to the next, such as over the tiles of a floor, takes its
 /// load along. If a pair begins to touch in the step in which another pair of the same body
@@ -98,11 +101,16 @@ class BlowGatherer {
   /// forces.
   Events Begin(double time_s);
 
+  /// Sets the pose of an object, which has this serial, in this step.
+  void Move(uint32_t handle, uint64_t serial, const Pose& pose) {
+    poses_.Move(handle, serial, pose);
+  }
+
   /// Adds a force to this step. The impulses in `force` are newtons, not newton seconds.
   void Add(const BodyImpulses& force, const Roughness& roughness);
 
   /// The greatest number of contacts of a step, and of pairs of bodies whose contacts are followed.
-  /// A pair and its contact take about 700 bytes.
+  /// A pair and its contact take about 900 bytes.
   static constexpr size_t kMostTouches = 16'384;
 
   /// Returns whether Touch may be called with this contact.
@@ -142,6 +150,8 @@ class BlowGatherer {
     double mass_kg = 1;  // of the object
     uint64_t serial = 0;
     SurfaceImpulse impulse;
+    Vector3 point_m{};  // in the object's frame
+    Vector3 turn{};     // as in BodyImpulse
     Collision collision{};
   };
   struct PairTouch {
@@ -152,6 +162,8 @@ class BlowGatherer {
     Roughness roughness;
     double time_offset_s = 0;
     bool duration_follows_impulse = false;
+    bool mass_is_stated = false;
+    std::optional<double> striker_per_kg = 0;  // as in BodyImpulses
 
     std::span<const Part> all() const { return std::span(parts).first(part_count); }
   };
@@ -160,6 +172,8 @@ class BlowGatherer {
     double scale = 1;    ///< impulse that the blow gives the touch, over that of its strongest step
     double of_blow = 1;  ///< the part of the touch in the blow's impulse
     double of_mass = 1;  ///< the part of the mass that a place brings to rest, by its impulse
+    double mass_kg = 0;  ///< as in Collision, of the whole blow
+    double speed_m_per_s = 0;  ///< approach speed, or zero: J/(2 m)
   };
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, const BlowShares& shares);
   /// Returns the vertex nearest to a touch. Touches with the same one are at the same place.
@@ -177,7 +191,8 @@ class BlowGatherer {
       double impulse = 0;  // above the load, N s
       double force = 0;    // the whole force, newtons
     };
-    double load_newtons = 0;  // load before the blow
+    double load_newtons = 0;      // load before the blow
+    double approach_m_per_s = 0;  // at the places of the first step; zero if unknown
     double begin_s = 0;
     std::vector<Step> steps{};
     size_t strongest = 0;              // index of the step with the greatest impulse
@@ -189,6 +204,8 @@ class BlowGatherer {
     bool begun() const { return !steps.empty(); }
     double greatest() const { return steps.empty() ? 0 : steps[strongest].impulse; }
   };
+  /// Returns the mass and the speed of the collision that a blow of this impulse, N s, is.
+  static Collision CollisionOf(const Blow& blow, double impulse);
   struct Pair {
     Bodies bodies;
     LoadTracker load{};
@@ -228,6 +245,9 @@ class BlowGatherer {
   bool Flickers(Blow& blow, double force_newtons);
   /// Ends what turned out to be a load.
   void CountAsLoad(Blow& blow);
+  /// Returns the mean of the speeds at which the places of the touches approach, weighted by their
+  /// impulses, or zero if it is not known.
+  double ApproachSpeed(std::span<const PairTouch> touches) const;
   /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
   /// first step.
   void Gather(Pair& pair, double force_newtons, double impulse) const;
@@ -256,9 +276,10 @@ class BlowGatherer {
   std::vector<Pair> pairs_;         // ascending by bodies
   std::set<Bodies> new_pairs_;      // pairs of this step that are not in pairs_ yet
   std::vector<ForceEvent> events_;  // those of the last call
-  bool follows_ = false;            // whether no step is missing before this step
-  std::vector<Motion> motions_;     // ascending; of this step, if it was asked for
-  double gap_s_ = 0;                // time since the previous step that was sent
+  RecentPoses poses_;
+  bool follows_ = false;         // whether no step is missing before this step
+  std::vector<Motion> motions_;  // ascending; of this step, if it was asked for
+  double gap_s_ = 0;             // time since the previous step that was sent
   double first_time_s_ = 0;
   BlowCounts counts_;
 };

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "proto/cpp/status_macros.h"
+#include "server/synthesis/voice/vector3.h"
 
 namespace carillon {
 namespace {
@@ -65,15 +66,47 @@ double MassKg(const SoundingObject& object) {
   return volume > 0 ? volume * material.density_kg_per_m3 : std::numeric_limits<double>::infinity();
 }
 
+/// Returns the angular impulse as BodyImpulse::turn has it.
+Vector3 TurnOf(const SoundingObject& object, const Vector3& point_m, const Vector3& impulse) {
+  const double size = object.properties.material.size;
+  const Vector3& centre = object.body->centre_m;
+  const std::array<Vector3, 3>& root = object.body->inertia_root;
+  if (root[0][0] == 0) return {};
+  const Vector3 arm{point_m[0] - size * centre[0], point_m[1] - size * centre[1],
+                    point_m[2] - size * centre[2]};
+  const Vector3 angular{arm[1] * impulse[2] - arm[2] * impulse[1],
+                        arm[2] * impulse[0] - arm[0] * impulse[2],
+                        arm[0] * impulse[1] - arm[1] * impulse[0]};
+  const double scale =
+      1 / std::sqrt(object.properties.material.density_kg_per_m3 * std::pow(size, 5));
+  Vector3 turn{};
+  for (size_t row = 0; row < 3; ++row) {
+    double rest = scale * angular[row];
+    for (size_t k = 0; k < row; ++k) rest -= root[row][k] * turn[k];
+    turn[row] = rest / root[row][row];
+  }
+  return turn;
+}
+
+/// Returns the mass of the point that an impulse strikes: the impulse squared over twice the energy
+/// that it gives the object.
+double MassAtPointKg(const BodyImpulse& on_body) {
+  const auto& [x, y, z] = on_body.impulse().impulse_newton_seconds;
+  const double squared = double{x} * x + double{y} * y + double{z} * z;
+  const double turn = Dot(on_body.turn, on_body.turn);
+  return squared > 0 ? 1 / (1 / on_body.mass_kg + turn / squared) : on_body.mass_kg;
+}
+
 /// Returns the object as one of two bodies that collide at `located`.
-ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& located) {
+ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& located,
+                          const BodyImpulse& impulse) {
   const ModalModel& model = *object.body->model;
   const Point point = object.body->At(located);
   const uint32_t given = model.given_triangle[located.triangle];
   const SoundingMaterial& material = object.properties.material;
   ElasticBody body{.young_pa = material.young_pa,
                    .poisson_ratio = PoissonRatioOf(model, object.properties),
-                   .mass_kg = MassKg(object),
+                   .mass_kg = MassAtPointKg(impulse),
                    .curvature_per_m = object.body->curvature.At(given, point, material.size)};
   if (model.regions.empty()) return body;
   const size_t region = model.given_triangle_regions[given];
@@ -96,6 +129,9 @@ void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vec
   on_body.distance_m = located.distance_m * material.size;
   on_body.extent_m = object.body->extent_m * material.size;
   on_body.mass_kg = MassKg(object);
+  on_body.point_m = object.body->At(located);
+  for (double& coordinate : on_body.point_m) coordinate *= material.size;
+  on_body.turn = TurnOf(object, on_body.point_m, impulse);
   on_body.serial = object.serial;
   on_body.largest_newton_seconds =
       10 * on_body.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
@@ -144,18 +180,24 @@ absl::Status FindBodyImpulses(const ObjectContact& contact, PointSource source,
     impulses.by[1].handle = contact.second->handle;
     impulses.count = 2;
     FillIn(*second, on_second, opposite, impulses.by[1]);
-    striker = ElasticBodyAt(*second, on_second);
+    striker = ElasticBodyAt(*second, on_second, impulses.by[1]);
   }
   if (impulse.duration_s) {
     SetDuration(*impulse.duration_s, impulses);
     return absl::OkStatus();
   }
-  const ElasticBody struck = ElasticBodyAt(object, located);
+  const ElasticBody struck = ElasticBodyAt(object, located, impulses.by[0]);
   const Collision collision{
       .reduced_mass_kg = ReducedMassKg(struck, striker, impulse.hertz),
       .stated_speed_m_per_s = impulse.hertz.approach_speed_m_per_s.value_or(0)};
   for (BodyImpulse& one : impulses.all()) one.collision = collision;
   impulses.duration_follows_impulse = !impulse.hertz.approach_speed_m_per_s;
+  impulses.mass_is_stated = impulse.hertz.reduced_mass_kg.has_value();
+  if (second == nullptr) {
+    const bool knows = impulse.hertz.striker_mass_kg && !impulse.hertz.striker_mass_is_named;
+    impulses.striker_per_kg =
+        knows ? std::optional(1 / *impulse.hertz.striker_mass_kg) : std::nullopt;
+  }
   SetDuration(
       HertzDurationS(struck, striker, impulse.hertz, Magnitude(impulse.impulse_newton_seconds)),
       impulses);

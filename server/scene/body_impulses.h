@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <variant>
 
@@ -23,6 +24,10 @@ struct BodyImpulse {
   double distance_m = 0;  ///< distance from the point of the contact to the surface
   double extent_m = 0;    ///< extent of the object
   double mass_kg = 1;     ///< mass of the object
+  Vector3 point_m{};      ///< the point on the surface, in the object's frame at its size
+  /// The angular impulse about the centre of mass, times a root of the inverse tensor of inertia.
+  /// Half its square is the energy of the turn that it gives the object at rest, J.
+  Vector3 turn{};
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.
   double largest_newton_seconds = std::numeric_limits<double>::infinity();
@@ -39,6 +44,9 @@ struct BodyImpulses {
   /// Whether the duration was computed from the impulse, so that a greater impulse has a shorter
   /// contact.
   bool duration_follows_impulse = false;
+  bool mass_is_stated = false;  ///< whether the client stated the reduced mass
+  /// One over the mass of a body that is no object, 1/kg; nothing if nobody stated its mass.
+  std::optional<double> striker_per_kg = 0;
 
   std::span<BodyImpulse> all() { return std::span(by).first(count); }
   std::span<const BodyImpulse> all() const { return std::span(by).first(count); }

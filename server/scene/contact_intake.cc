@@ -198,6 +198,7 @@ absl::Status ContactIntake::TryMove(uint32_t handle, const Pose& pose) {
   const MutexLock lock(&scene_.mutex());
   ASSIGN_OR_RETURN(const SoundingObject* object, scene_.Move(handle, pose));
   moved_ = true;
+  if (!pauses_) gatherer_.Move(handle, object->serial, pose);
   if (balance_ && !pauses_) {
     const Quaternion orientation = Normalized(pose.orientation);
     Vector3 centre = object->body->centre_m;

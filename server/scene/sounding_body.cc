@@ -44,6 +44,20 @@ absl::Status CheckShapes(const ModalModel& model) {
   return absl::OkStatus();
 }
 
+/// Returns the lower triangular root L of a tensor L L^T, or zero if it is not positive.
+std::array<Vector3, 3> RootOf(const std::array<Vector3, 3>& tensor) {
+  std::array<Vector3, 3> root{};
+  for (size_t row = 0; row < 3; ++row) {
+    for (size_t column = 0; column <= row; ++column) {
+      double rest = tensor[row][column];
+      for (size_t k = 0; k < column; ++k) rest -= root[row][k] * root[column][k];
+      if (row == column && !(rest > 1e-9 * tensor[row][row])) return {};
+      root[row][column] = row == column ? std::sqrt(rest) : rest / root[column][column];
+    }
+  }
+  return root;
+}
+
 absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
     std::shared_ptr<const ModalModel> model) {
   // Two threads make the two parts, because a client waits for the object. The new thread is not
@@ -69,6 +83,7 @@ absl::StatusOr<std::shared_ptr<const SoundingBody>> MakeBody(
       .edges = std::move(edges),
       .volume_m3 = of.regions.empty() ? VolumeM3(of.vertices, of.triangles) : of.mass_kg,
       .centre_m = CentreM(of.vertices, of.triangles),
+      .inertia_root = RootOf(InertiaM5(of.vertices, of.triangles)),
       .extent_m = ExtentM(of.vertices)});
 }
 

@@ -9,6 +9,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
 #include "server/base/mutex.h"
+#include "server/base/pose.h"
 #include "server/excitation/sharp_edges.h"
 #include "server/excitation/surface_curvature.h"
 #include "server/excitation/surface_locator.h"
@@ -30,6 +31,9 @@ struct SoundingBody {
   double volume_m3 = 0;
   /// Centre of mass of a body of one material at the model's size.
   std::array<double, 3> centre_m{};
+  /// The lower triangular root L of the tensor of inertia L L^T about the centre, at the model's
+  /// size and for unit density, m^2.5; zero if unknown.
+  std::array<Vector3, 3> inertia_root{};
   double extent_m = 0;  ///< the diagonal of the bounding box at the model's size
 
   /// Returns a point of the sounding surface, in the model's frame and size, metres.

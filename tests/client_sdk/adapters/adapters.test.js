@@ -37,6 +37,8 @@ test('the object with the lower handle is the object of a row, however the engin
   // The client for Node refuses rows with other names.
   const [silent] = rows.rows({ ...contact, first: still('a'), second: { key: 'c', massKg: 2 } });
   assert.deepEqual([silent.object, silent.striker], [4, { striker: '', strikerMassKg: 2 }]);
+  const [fixed] = rows.rows({ ...contact, first: still('a'), second: still('c') });
+  assert.deepEqual(fixed.striker, { striker: '', strikerMassKg: 1e6, strikerRadiusM: 1 });
 });
 
 test('velocities alone give the impulse of a collision', () => {

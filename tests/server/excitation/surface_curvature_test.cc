@@ -180,5 +180,20 @@ TEST(SurfaceMeasures, ABoxHasItsVolumeAndDiagonal) {
   EXPECT_EQ(VolumeM3(mesh.vertices, {}), 0);
 }
 
+TEST(SurfaceMeasures, ABoxHasItsInertiaWhicheverWayItsTrianglesTurn) {
+  Mesh mesh = Box();
+  const double volume = 0.1 * 0.06 * 0.04;
+  for (int turned = 0; turned < 2; ++turned, mesh.TurnInsideOut()) {
+    const auto inertia = InertiaM5(mesh.vertices, mesh.triangles);
+    const std::array<double, 3> squares{0.1 * 0.1, 0.06 * 0.06, 0.04 * 0.04};
+    for (size_t i = 0; i < 3; ++i) {
+      const double across = squares[(i + 1) % 3] + squares[(i + 2) % 3];
+      EXPECT_NEAR(inertia[i][i], volume * across / 12, 1e-12);
+      EXPECT_NEAR(inertia[i][(i + 1) % 3], 0, 1e-12);
+    }
+  }
+  EXPECT_EQ(InertiaM5(mesh.vertices, {})[0][0], 0);
+}
+
 }  // namespace
 }  // namespace carillon

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -12,6 +13,7 @@
 #include <numeric>
 #include <optional>
 #include <random>
+#include <span>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -516,6 +518,112 @@ TEST(BlowGatherer, ContactsAtOnePlaceAreOneContact) {
     EXPECT_NEAR(DurationS(blow), 1e-3 * std::pow(1.0 / 2, 0.2), 1e-9);
   }
   EXPECT_NEAR(DurationS(Landing({1}).at(0)), 1e-3, 1e-9);
+}
+
+/// The speed that a body of half implicit steps has in the step in which it meets the floor, m/s.
+constexpr double kFallMPerS = 9.81 * kStepS * 20;
+
+/// Lets a body of 1 kg fall for 19 steps, with a pose in each, and land in the next one with
+/// `impulses`. Returns its blows.
+std::vector<ForceEvent> Fall(std::span<const BodyImpulses> impulses, double leap_m = 0) {
+  BlowGatherer gatherer(kStepS);
+  double height_m = 1;
+  for (int step = 1; step < 20; ++step) {
+    gatherer.Begin(step * kStepS);
+    height_m -= 9.81 * kStepS * kStepS * step;
+    gatherer.Move(3, 1, {.position_m = {0, 0, step < 18 ? height_m + leap_m : height_m}});
+    gatherer.End();
+  }
+  gatherer.Begin(20 * kStepS);
+  gatherer.Move(3, 1, {.position_m = {0, 0, height_m}});
+  for (const BodyImpulses& impulse : impulses) gatherer.Touch({.contact = {.handle = 3}}, impulse);
+  std::vector<ForceEvent> blows;
+  const auto add = [&](BlowGatherer::Events events) {
+    std::ranges::copy_if(events, std::back_inserter(blows), [](const ForceEvent& event) {
+      return std::holds_alternative<SurfaceImpulse>(event.action);
+    });
+  };
+  add(gatherer.End());
+  add(gatherer.Finish());
+  return blows;
+}
+
+/// An impulse at a vertex, whose duration of 1 ms is that of a collision of 1 kg at J/(2 m).
+BodyImpulses Landing(double newton_seconds, uint32_t vertex = 0) {
+  const SurfaceImpulse impulse{.at = {.vertices = {vertex, 8, 9}, .weights = {1, 0, 0}},
+                               .impulse_newton_seconds = {0, 0, static_cast<float>(newton_seconds)},
+                               .pulse = Pulse::RaisedCosine(1e-3F)};
+  BodyImpulses impulses = ImpulseOn(3, impulse);
+  impulses.by[0].collision.reduced_mass_kg = 1;
+  impulses.duration_follows_impulse = true;
+  return impulses;
+}
+
+/// The duration after Hertz of a collision of 1 kg that takes 1 ms at another speed, s.
+double AtSpeed(double m_per_s, double one_ms_at_m_per_s) {
+  return 1e-3 * std::pow(m_per_s / one_ms_at_m_per_s, -0.2);
+}
+
+TEST(BlowGatherer, ABlowHasTheSpeedOfThePosesWhateverTheRestitution) {
+  for (const double restitution : {0.0, 0.5, 0.9}) {
+    const double impulse = (1 + restitution) * kFallMPerS;
+    const std::vector<ForceEvent> blows = Fall(std::array{Landing(impulse)});
+    ASSERT_EQ(blows.size(), 1U);
+    EXPECT_NEAR(DurationS(blows[0]), AtSpeed(kFallMPerS, impulse / 2), 1e-9) << restitution;
+    EXPECT_NEAR(blows[0].collision.stated_speed_m_per_s, kFallMPerS, 1e-9) << restitution;
+  }
+}
+
+TEST(BlowGatherer, ASpeedThatTheImpulseContradictsDoesNotCount) {
+  const std::pair<double, double> contradictions[] = {
+      {kFallMPerS, 20},        // it was put elsewhere just before
+      {4 * kFallMPerS, 0},     // it was struck by what moves
+      {0.2 * kFallMPerS, 0}};  // it only grazed the floor
+  for (const auto& [impulse, leap_m] : contradictions) {
+    const std::vector<ForceEvent> blows = Fall(std::array{Landing(impulse)}, leap_m);
+    ASSERT_EQ(blows.size(), 1U);
+    EXPECT_NEAR(DurationS(blows[0]), 1e-3, 1e-9) << impulse;
+    EXPECT_EQ(blows[0].collision.stated_speed_m_per_s, 0) << impulse;
+  }
+}
+
+TEST(BlowGatherer, AStatedMassOrSpeedStays) {
+  BodyImpulses of_mass = Landing(kFallMPerS), of_speed = Landing(kFallMPerS);
+  of_mass.mass_is_stated = true;
+  of_mass.by[0].mass_kg = 3;
+  of_speed.duration_follows_impulse = false;
+  of_speed.by[0].collision.stated_speed_m_per_s = 7;
+  EXPECT_EQ(Fall(std::array{of_mass}).at(0).collision.reduced_mass_kg, 1);
+  const ForceEvent blow = Fall(std::array{of_speed}).at(0);
+  EXPECT_NEAR(DurationS(blow), 1e-3, 1e-9);
+  EXPECT_EQ(blow.collision.stated_speed_m_per_s, 7);
+}
+
+TEST(BlowGatherer, ACornerBringsLessMassToRestThanAFaceWhoseTurnsCancel) {
+  BodyImpulses left = Landing(kFallMPerS / 2, 0), right = Landing(kFallMPerS / 2, 1);
+  left.by[0].turn[1] = kFallMPerS;
+  right.by[0].turn[1] = -kFallMPerS;
+  left.by[0].collision.reduced_mass_kg = right.by[0].collision.reduced_mass_kg = 0.2;
+  const std::vector<ForceEvent> face = Fall(std::array{left, right});
+  ASSERT_EQ(face.size(), 2U);
+  for (const ForceEvent& blow : face) EXPECT_NEAR(blow.collision.reduced_mass_kg, 0.5, 1e-6);
+  // 1/m = 1/M + turn^2/J^2 = 1 + 4
+  EXPECT_NEAR(Fall(std::array{left}).at(0).collision.reduced_mass_kg, 0.2, 1e-6);
+}
+
+TEST(BlowGatherer, ABodyThatFallsOnAnUnknownOneMeetsAFloorAndNotAHammer) {
+  BodyImpulses impulse = Landing(1.5 * kFallMPerS);
+  impulse.striker_per_kg = std::nullopt;
+  impulse.by[0].collision.reduced_mass_kg = 0.02;
+  const ForceEvent blow = Fall(std::array{impulse}).at(0);
+  EXPECT_NEAR(blow.collision.reduced_mass_kg, 1, 1e-9);
+  EXPECT_NEAR(DurationS(blow), AtSpeed(kFallMPerS, 1.5 * kFallMPerS / 0.04) * std::pow(50, 0.4),
+              1e-9);
+  // What strikes a body is a hammer.
+  impulse = Landing(0.1 * kFallMPerS);
+  impulse.striker_per_kg = std::nullopt;
+  impulse.by[0].collision.reduced_mass_kg = 0.02;
+  EXPECT_NEAR(Fall(std::array{impulse}).at(0).collision.reduced_mass_kg, 0.02, 1e-9);
 }
 
 TEST(BlowGatherer, ABodyThatIsPutDownGentlyDoesNotStrike) {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -321,6 +322,34 @@ TEST_F(ReadingTest, TheModesOfAThinBodyYieldToABlowWithoutADuration) {
   EXPECT_EQ(newest_gains(), gains);
   impulse.contact.handle = 1;  // whose modes hardly move it
   EXPECT_TRUE(gains_of(cosine).none());
+}
+
+TEST_F(ReadingTest, ABodyThatFallsStrikesAtTheSpeedOfItsPoses) {
+  const auto lands = [&](double newton_seconds, std::optional<double> stated_m_per_s) {
+    ContactIntake intake(scene_, target_, {.step_s = kStepS});
+    double height_m = 10;
+    for (int step = 1; step <= 40; ++step) {
+      EXPECT_TRUE(intake.BeginStep(step * kStepS).ok());
+      if (step < 40) height_m -= 9.81 * kStepS * kStepS * step;
+      if (!stated_m_per_s) intake.Move(1, {.position_m = {height_m, 0, 0}});
+      ObjectTouch touch{.contact = SmallImpulse(1, newton_seconds).contact};
+      touch.contact.impulse.duration_s = std::nullopt;
+      touch.contact.impulse.hertz = {.approach_speed_m_per_s = stated_m_per_s,
+                                     .striker_mass_kg = 1e6};
+      if (step == 40) intake.Touch(touch);
+      intake.EndStep();
+    }
+    intake.Finish();
+    const auto blow =
+        std::ranges::find_if(target_.events.rbegin(), target_.events.rend(),
+                             [](const MixerEvent& e) { return e.impulse() != nullptr; });
+    return double{blow->impulse()->pulse.duration_s()};
+  };
+  // At its corner the tetrahedron of 0.45 kg meets the floor with a third of its mass.
+  const double speed = 9.81 * kStepS * 40;
+  for (const double impulse : {0.15 * speed, 0.25 * speed}) {
+    EXPECT_NEAR(lands(impulse, std::nullopt) / lands(impulse, speed), 1, 1e-5) << impulse;
+  }
 }
 
 TEST_F(ReadingTest, AStepThatIsStatedTooShortIsFound) {

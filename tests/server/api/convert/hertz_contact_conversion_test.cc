@@ -63,5 +63,32 @@ TEST(HertzContactConversion, FiguresOverrideThoseOfTheStriker) {
   EXPECT_FALSE(ToHertzContact({})->striker_young_pa);
 }
 
+TEST(HertzContactConversion, AMaterialIsAFlatFloorThatDoesNotMove) {
+  v1::HertzContact named;
+  named.set_striker("concrete");
+  named.set_striker_poisson_ratio(0.25);
+  const HertzContact floor = *ToHertzContact(named);
+  EXPECT_EQ(floor.striker_young_pa, 2.6e10);
+  EXPECT_EQ(floor.striker_poisson_ratio, 0.25);
+  const ElasticBody ball{
+      .young_pa = 2e11, .poisson_ratio = 0.3, .mass_kg = 1, .curvature_per_m = 40};
+  EXPECT_NEAR(ReducedMassKg(ball, kSteelTip, floor), 1, 1e-9);
+  HertzContact same = floor;
+  same.reduced_radius_m = 1.0 / 40;
+  EXPECT_NEAR(HertzDurationS(ball, kSteelTip, floor, 1), HertzDurationS(ball, kSteelTip, same, 1),
+              1e-12);
+}
+
+TEST(HertzContactConversion, OnlyAStatedMassCountsAsKnown) {
+  v1::HertzContact named;
+  named.set_striker("wood");
+  EXPECT_TRUE(ToHertzContact(named)->striker_mass_is_named);
+  named.set_striker_mass_kg(0.5);
+  EXPECT_FALSE(ToHertzContact(named)->striker_mass_is_named);
+  named.set_striker("oak");
+  named.clear_striker_mass_kg();
+  EXPECT_FALSE(ToHertzContact(named)->striker_mass_is_named);
+}
+
 }  // namespace
 }  // namespace carillon
