@@ -65,11 +65,15 @@ std::vector<std::string> NearNames(std::string_view written, std::span<const std
 absl::Status UnknownName(absl::string_view reason, absl::string_view kind, const std::string& name,
                          std::span<const std::string> known) {
   const std::vector<std::string> near = NearNames(name, known);
-  return Refusal(
+  absl::Status refusal = Refusal(
       absl::StatusCode::kInvalidArgument, reason,
       absl::StrCat("no ", kind, " is named \"", name, "\"", near.empty() ? "" : ", the nearest is ",
-                   absl::StrJoin(near, " or "), "; name one of ", absl::StrJoin(known, ", "),
-                   ", or give the figures themselves"));
+                   absl::StrJoin(near, " or "), "; name one of the catalogue (", known.size(),
+                   " names, such as ", known.front(),
+                   "; the error's metadata has all), or give the figures themselves"));
+  if (!near.empty()) AddFigure(refusal, "nearest", near.front());
+  AddFigure(refusal, "names", absl::StrJoin(known, ","));
+  return refusal;
 }
 
 }  // namespace carillon

@@ -17,7 +17,8 @@ namespace carillon {
 std::vector<std::string> NearNames(std::string_view written, std::span<const std::string> names);
 
 /// Returns `REASON: no KIND is named "NAME"` as an InvalidArgument, with the nearest of the known
-/// names and all of them.
+/// names. The figure "nearest" has the first of these, and "names" all known ones, separated by
+/// commas. `known` is not empty.
 absl::Status UnknownName(absl::string_view reason, absl::string_view kind, const std::string& name,
                          std::span<const std::string> known);
 

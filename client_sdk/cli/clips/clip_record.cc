@@ -25,10 +25,21 @@ std::string LineOf(const Json& json) {
 
 Json Array(const v1::Vec3& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
-Json ObjectJson(const v1::ContactTraceObject& object, const ClipFile* stem) {
+/// Adds what the object sounds with.
+void AddState(const ObjectState& state, Json& json) {
+  if (!state.material) return;
+  Json figures = Json::parse(MessageJson(*state.material));
+  if (!state.material->preset().empty()) json["material"] = state.material->preset();
+  figures.erase("preset");
+  json["material_figures"] = std::move(figures);
+  json["transfer"] = state.has_transfer;
+}
+
+Json ObjectJson(const v1::ContactTraceObject& object, const ObjectState& state,
+                const ClipFile* stem) {
   Json json = {{"handle", object.handle()}, {"model", object.modal_model()}};
   if (!object.label().empty()) json["label"] = object.label();
-  if (!object.material().preset().empty()) json["material"] = object.material().preset();
+  AddState(state, json);
   if (stem != nullptr) {
     json["file"] = stem->name;
     json["sha256"] = stem->digest;
@@ -70,16 +81,42 @@ bool IsThere(const std::filesystem::path& folder, const Json& file) {
   return digest.ok() && *digest == file.at("sha256");
 }
 
+/// Whether each object still sounds with what the record says.
+bool HasStates(const Json& objects, const std::vector<ObjectState>& states) {
+  if (objects.size() != states.size()) return false;
+  for (size_t i = 0; i < states.size(); ++i) {
+    Json wanted = Json::object();
+    AddState(states[i], wanted);
+    const auto is_same = [&](const auto& member) {
+      return objects[i].contains(member.key()) && objects[i][member.key()] == member.value();
+    };
+    for (const auto& member : wanted.items()) {
+      if (!is_same(member)) return false;
+    }
+  }
+  return true;
+}
+
 bool IsWhole(const std::filesystem::path& folder, const ClipRecord& wanted, const Json& json) {
   const Json& objects = json.at("objects");
   return json.at("trace_sha256") == wanted.trace_digest &&
-         json.at("settings") == Json::parse(wanted.settings) && IsThere(folder, json) &&
+         json.at("settings") == Json::parse(wanted.settings) && HasStates(objects, wanted.states) &&
+         IsThere(folder, json) &&
          std::all_of(objects.begin(), objects.end(), [&](const Json& object) {
            return !object.contains("file") || IsThere(folder, object);
          });
 }
 
 }  // namespace
+
+bool AreSame(const std::vector<ObjectState>& a, const std::vector<ObjectState>& b) {
+  return std::ranges::equal(a, b, [](const ObjectState& one, const ObjectState& other) {
+    Json first = Json::object(), second = Json::object();
+    AddState(one, first);
+    AddState(other, second);
+    return first == second;
+  });
+}
 
 std::string SettingsText(const RenderOptions& options, const std::string& daemon_version) {
   Json json = {{"sample_rate_hz", options.sample_rate_hz},
@@ -107,7 +144,7 @@ std::string RecordLine(const ClipRecord& record) {
   json["objects"] = Json::array();
   for (size_t i = 0; i < record.objects.size(); ++i) {
     const ClipFile* const stem = i < record.stems.size() ? &record.stems[i] : nullptr;
-    json["objects"].push_back(ObjectJson(record.objects[i], stem));
+    json["objects"].push_back(ObjectJson(record.objects[i], record.states[i], stem));
   }
   json["blows"] = Json::array();
   for (const v1::Blow& blow : record.blows) json["blows"].push_back(BlowJson(blow));
@@ -133,6 +170,7 @@ ClipTotals TotalsOf(const std::filesystem::path& manifest) {
     ++totals.clip_count;
     totals.frame_count += frames;
     totals.limited_frame_count += limited;
+    if (record.value("paper_coupling_object_count", uint64_t{0}) > 0) ++totals.paper_clip_count;
     totals.peak_pa = std::max(totals.peak_pa, record.value("peak_pa", 0.0));
     if (limited > 0) {
       totals.limited_clips.push_back(
@@ -142,6 +180,13 @@ ClipTotals TotalsOf(const std::filesystem::path& manifest) {
       auto& [count, instance] = warnings[warning.at("id")];
       if (count++ == 0) instance = absl::StrCat(clip, ": ", warning.value("text", ""));
     }
+  }
+  if (totals.paper_clip_count > 0) {
+    totals.warnings.push_back(absl::StrCat(
+        Counted(totals.paper_clip_count, "clip"),
+        " with objects sounding by the paper's coupling, whose levels are not physical, for lack "
+        "of a transfer: once `carillon job list` shows none at work, the same command renders "
+        "them again; `carillon transfer` makes one that was never begun"));
   }
   std::ranges::stable_sort(totals.limited_clips, std::ranges::greater(),
                            &ClipTotals::LimitedClip::share);

@@ -20,6 +20,7 @@
 #include "client_sdk/cli/clips/clip_folder.h"
 #include "client_sdk/cli/clips/clip_record.h"
 #include "client_sdk/cli/clips/file_digest.h"
+#include "client_sdk/cli/commands/mode_sound.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
@@ -55,13 +56,20 @@ class ClipRenderer {
     record.clip = clip;
     record.settings = settings_;
     ASSIGN_OR_RETURN(record.trace_digest, FileDigest(trace));
-    if (IsRendered(folder_.Final(""), record)) return false;
     RETURN_IF_ERROR(ReadHead(trace, record));
-    RETURN_IF_ERROR(RenderSound(trace, record));
+    std::vector<ObjectState> states = StatesOf(record.objects);
+    record.states = states;
+    if (IsRendered(folder_.Final(""), record)) return false;
+    do {  // once more if a material or a transfer has changed meanwhile
+      record.states = std::move(states);
+      record.stems.clear();
+      RETURN_IF_ERROR(RenderSound(trace, record));
+      for (const v1::ContactTraceObject& object : record.objects) {
+        if (options_.stems) RETURN_IF_ERROR(RenderStem(trace, object.handle(), record));
+      }
+      states = StatesOf(record.objects);
+    } while (!AreSame(states, record.states));
     const std::string stems = absl::StrCat(clip, ".stems");
-    for (const v1::ContactTraceObject& object : record.objects) {
-      if (options_.stems) RETURN_IF_ERROR(RenderStem(trace, object.handle(), record));
-    }
     std::error_code ignored;
     if (record.stems.empty()) fs::remove_all(folder_.Final(stems), ignored);
     if (!record.stems.empty()) RETURN_IF_ERROR(folder_.Publish(stems));
@@ -88,6 +96,25 @@ class ClipRenderer {
       if (!record || !record->has_object()) return absl::OkStatus();
       clip.objects.push_back(record->object());
     }
+  }
+
+  /// Asks the daemon what the objects would sound with now.
+  std::vector<ObjectState> StatesOf(const std::vector<v1::ContactTraceObject>& objects) const {
+    std::vector<ObjectState> states;
+    for (const v1::ContactTraceObject& object : objects) {
+      ObjectState& state = states.emplace_back();
+      const auto model = daemon_.GetModalModel(object.modal_model());
+      if (!model.ok()) continue;  // which keeps a clip, and is the error of any other
+      const bool is_named = object.material().ByteSizeLong() > 0;
+      const v1::Material& asked = is_named ? object.material() : model->material();
+      auto material = MatchedMaterial(*model, asked);
+      if (!material.ok()) continue;
+      state.has_transfer = object.radiation() != v1::RADIATION_MODEL_PAPER_COUPLING &&
+                           HasTransfer(*model, *material);
+      state.material = *std::move(material);
+      state.material->set_preset(asked.preset());
+    }
+    return states;
   }
 
   absl::Status RenderSound(const std::string& trace, ClipRecord& record) const {
@@ -170,6 +197,7 @@ class ClipRenderer {
     RETURN_IF_ERROR(summary.status());
     RETURN_IF_ERROR(file.Finish());
     record.summary = *std::move(summary);
+    file.Describe(record.summary);
     record.factor = file.factor();
     record.frame_count = file.frame_count();
     record.sample_rate_hz = form.format.sample_rate_hz;

@@ -233,7 +233,7 @@ inline constexpr double kLimiterHeadroom = 1.4126;
 std::optional<double> BetterFullScale(const RenderOptions& options,
                                       const v1::RenderSummary& summary);
 /// Errors: InvalidArgument (TRACE_EMPTY: the rendered trace has no contact, and its sound is
-/// silent).
+/// silent; or the reason of the last rejection, if all contacts were rejected).
 absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& summary);
 
 /// Returns the name of a scene that `text` names as "scenes/7" or "7". Returns an empty string if

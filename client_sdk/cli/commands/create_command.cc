@@ -98,6 +98,7 @@ class ModelCreation {
   /// Errors: Internal (OUTPUT_NOT_WRITABLE), Unavailable (SERVER_UNAVAILABLE), that of the file if
   /// there is one file, FailedPrecondition (SOME_FAILED) if there are several.
   absl::Status Run() {
+    RETURN_IF_ERROR(CheckMaterial());
     RETURN_IF_ERROR(OpenReport());
     for (size_t i = 0; i < options_.files.size(); ++i) {
       RETURN_IF_ERROR(Request({.index = i, .begin = Clock::now()}));
@@ -118,10 +119,18 @@ class ModelCreation {
     size_t index = 0;  ///< of the file
     Clock::time_point begin;
     bool repairs = false;
+    bool computes = false;  ///< whether a job runs, or did not find the model stored
   };
 
   const std::string& FileOf(const Requested& requested) const {
     return options_.files[requested.index];
+  }
+
+  /// An error in the material would be that of every file, and is told once, before the first.
+  absl::Status CheckMaterial() const {
+    ASSIGN_OR_RETURN(const v1::Material material, ToMaterial(options_.material));
+    const absl::Status resolved = ResolveMaterial(material).status();
+    return ToErrorInfo(resolved).reason() == "UNKNOWN_MATERIAL" ? resolved : absl::OkStatus();
   }
 
   absl::Status OpenReport() {
@@ -149,7 +158,9 @@ class ModelCreation {
       if (!job.ok()) return Fail(requested, job.status());
       if (HasEnded(*job)) return Finish(requested, job->name());
       if (!options_.wait) return Succeed(requested, *job);
-      requested_.emplace(job->name(), requested);
+      Requested computed = requested;
+      computed.computes = true;
+      requested_.emplace(job->name(), computed);
       return absl::OkStatus();
     }
   }
@@ -183,10 +194,12 @@ class ModelCreation {
   /// Returns those of the requested jobs that have ended, at least one.
   absl::StatusOr<std::set<std::string>> AwaitSome() {
     std::set<std::string> active, ended;
+    seen_until_ = watch_end_;
     RETURN_IF_ERROR(daemon_.WatchJobs({}, [&](const v1::WatchJobsResponse& answer) {
       const std::string& name = answer.job().name();
       if (answer.has_job() && requested_.contains(name)) {
         (HasEnded(answer.job()) ? ended : active).insert(name);
+        NoteStart(answer.job());
       }
       // A requested job that is not among those that wait or run has ended before.
       for (auto at = requested_.begin(); !answer.has_job() && at != requested_.end(); ++at) {
@@ -194,13 +207,36 @@ class ModelCreation {
       }
       return ended.empty();
     }));
+    watch_end_ = Clock::now();
     return ended;
   }
 
+  /// Keeps the time at which a job that runs was started.
+  void NoteStart(const v1::Job& job) {
+    if (job.state() != v1::JOB_STATE_RUNNING || started_.contains(job.name())) return;
+    // The clock of this machine may differ from the daemon's.
+    const auto run = std::chrono::system_clock::now().time_since_epoch() -
+                     std::chrono::milliseconds(job.started_unix_ms());
+    const auto now = Clock::now();
+    started_[job.name()] = std::clamp(now - std::chrono::duration_cast<Clock::duration>(run),
+                                      std::min(seen_until_, now), now);
+  }
+
+  /// Returns the time since the job was started, seconds. A job whose start was not seen was
+  /// started since the last look.
+  double RunSeconds(const Requested& requested, const std::string& job) const {
+    if (!requested.computes) return 0;
+    const auto at = started_.find(job);
+    const Clock::time_point start =
+        at != started_.end() ? at->second : std::max(seen_until_, requested.begin);
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
   absl::Status Finish(const Requested& requested, const std::string& name) {
-    const absl::StatusOr<v1::Job> job = options_.files.size() == 1 && options_.wait
-                                            ? WatchWithProgress(daemon_, name)
-                                            : daemon_.WatchJob(name, nullptr);
+    const absl::StatusOr<v1::Job> job =
+        options_.files.size() == 1 && options_.wait
+            ? WatchWithProgress(daemon_, name, [&](const v1::Job& state) { NoteStart(state); })
+            : daemon_.WatchJob(name, nullptr);
     if (job.ok()) return Succeed(requested, *job);
     const v1::ErrorInfo refusal = ToErrorInfo(job.status());
     const bool repairs = options_.wait && options_.may_repair && !requested.repairs &&
@@ -213,9 +249,9 @@ class ModelCreation {
 
   absl::Status Succeed(const Requested& requested, const v1::Job& job) {
     const std::string& file = FileOf(requested);
-    const double seconds = std::chrono::duration<double>(Clock::now() - requested.begin).count();
-    std::vector<JsonMember> members = {
-        {"file", file}, {"index", uint64_t{requested.index}}, {"seconds", seconds}};
+    std::vector<JsonMember> members = {{"file", file},
+                                       {"index", uint64_t{requested.index}},
+                                       {"seconds", RunSeconds(requested, job.name())}};
     if (job.state() == v1::JOB_STATE_SUCCEEDED) {
       AddModel(file, job.modal_model(), members);
     } else {
@@ -272,6 +308,7 @@ class ModelCreation {
     const bool named = asked.ok() && asked->ByteSizeLong() > 0;
     const auto material = MatchedMaterial(*model, named ? *asked : model->material());
     if (!material.ok()) return;
+    members.push_back(MaterialMember(*material, named ? *asked : model->material()));
     for (JsonMember& member : ModeMembers(ModesOf(*model, *material, options_.size))) {
       members.push_back(std::move(member));
     }
@@ -282,7 +319,10 @@ class ModelCreation {
   CreateModelOptions repairing_;
   const bool json_;
   std::ofstream report_;
-  std::multimap<std::string, Requested> requested_;  ///< by the job, which files may share
+  std::multimap<std::string, Requested> requested_;   ///< by the job, which files may share
+  std::map<std::string, Clock::time_point> started_;  ///< by the job
+  /// The end of the last watch, and of the one before: starts up to then were seen.
+  Clock::time_point watch_end_ = Clock::now(), seen_until_ = watch_end_;
   size_t failed_count_ = 0;
   absl::Status last_error_;
 };

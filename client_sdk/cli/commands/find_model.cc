@@ -105,8 +105,12 @@ absl::Status NotMade(const std::string& text, const v1::Job& job) {
   } else {
     why = "its job was cancelled: call `carillon model create` again";
   }
-  return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND",
-                 absl::StrCat("the model '", text, "' is not there, because ", why));
+  absl::Status error = Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND",
+                               absl::StrCat("the model '", text, "' is not there, because ", why));
+  AddFigure(error, "job", job.name());
+  AddFigure(error, "job_state", v1::JobState_Name(job.state()));
+  if (!job.error().reason().empty()) AddFigure(error, "job_reason", job.error().reason());
+  return error;
 }
 
 /// Returns `not_found`, or the state of the newest job that has not made the model.

@@ -171,7 +171,13 @@ absl::Status ShowMaterial(const client::Client& daemon, const std::string& name,
   v1::Material unknown;
   unknown.set_preset(name);
   // Its error names the nearest materials.
-  return ResolveMaterial(unknown).status();
+  const absl::Status error = ResolveMaterial(unknown).status();
+  if (name != "list" && name != "show") return error;
+  v1::ErrorInfo info = ToErrorInfo(error);
+  info.set_message(absl::StrCat("no material is named \"", name,
+                                "\": `carillon material` lists all, and `carillon material oak` "
+                                "shows one"));
+  return FromErrorInfo(error.code(), info);
 }
 
 absl::Status Explain(const std::string& name, bool json) {

@@ -38,6 +38,16 @@ absl::StatusOr<v1::Material> MatchedMaterial(const v1::ModalModelSummary& model,
   return MatchRegions(model.header(), resolved);
 }
 
+JsonMember MaterialMember(const v1::Material& material, const v1::Material& asked) {
+  v1::Material named = material;
+  named.set_preset(asked.preset());
+  return {"material", JsonText{MessageJson(named)}};
+}
+
+bool HasTransfer(const v1::ModalModelSummary& model, const v1::Material& material) {
+  return FittingTransfer(model, material) != nullptr;
+}
+
 std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Material& material,
                                double size) {
   const v1::TransferSummary* const transfer = FittingTransfer(model, material);

@@ -32,6 +32,13 @@ struct ModeSound {
 absl::StatusOr<v1::Material> MatchedMaterial(const v1::ModalModelSummary& model,
                                              const v1::Material& material);
 
+/// Returns the member "material": the figures of a `material` of MatchedMaterial, and the name of
+/// the preset from which `asked`, the material that was named for it, took them.
+JsonMember MaterialMember(const v1::Material& material, const v1::Material& asked);
+
+/// Returns whether a stored transfer fits an object of the material of MatchedMaterial.
+bool HasTransfer(const v1::ModalModelSummary& model, const v1::Material& material);
+
 /// Returns the modes of a body of a `material` of MatchedMaterial, `size` times as large as the
 /// model: the natural frequency is sqrt(Lambda E/rho)/(2 pi size), and the decay by radiation is
 /// rho_air omega^2 I size/(2 c rho) with the power integral I of a transfer (transfer.proto).

@@ -34,11 +34,10 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
         "`carillon transfer` makes one that was never begun\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
-  const double written = summary.peak() * options.gain;
-  if (!options.normalize && written > 0 && written < kFaint) {
+  if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
     absl::FPrintF(out,
                   "the file peaks at %s; raise it by --gain, --normalize or --full-scale-pa %.2g\n",
-                  Decibels(written), std::max(summary.peak_pa() * 2, kLeastFullScale_pa));
+                  Decibels(summary.peak()), std::max(summary.peak_pa() * 2, kLeastFullScale_pa));
   }
 }
 
@@ -50,20 +49,14 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
   const auto loudness = [is_short](bool present, double lufs) {
     return is_short ? "too short to measure" : Loudness(present, lufs);
   };
-  absl::FPrintF(out, "%s: %.2f s, %s, peak %s%s\n", options.out,
+  absl::FPrintF(out, "%s: %.2f s, %s, peak %s\n", options.out,
                 static_cast<double>(summary.frame_count()) / sample_rate_hz,
-                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()),
-                summary.limited_frame_count() > 0 ? " before the limiter" : "");
+                Counted(summary.accepted_count(), "impulse"), Decibels(summary.peak()));
   absl::FPrintF(out,
-                "%.3g Pa (full scale is %.4g Pa), true peak %s, whole sound %s, loudest 0.4 s %s\n",
+                "%.3g Pa (full scale is %.4g Pa), true peak %s, whole file %s, loudest 0.4 s %s\n",
                 summary.peak_pa(), summary.full_scale_pa(), Decibels(summary.true_peak()),
                 loudness(summary.has_integrated_lufs(), summary.integrated_lufs()),
                 loudness(summary.has_loudest_momentary_lufs(), summary.loudest_momentary_lufs()));
-  if (summary.rejected_count() > 0) {
-    absl::FPrintF(out, "%s could not be used; the newest: %s: %s\n",
-                  Counted(summary.rejected_count(), "impulse"), summary.last_rejection().reason(),
-                  summary.last_rejection().message());
-  }
   for (const v1::Warning& warning : summary.warnings()) {
     absl::FPrintF(out, "%s: %s\n", warning.id(), warning.text());
   }
@@ -79,8 +72,7 @@ void PrintSummary(const RenderOptions& options, const v1::RenderSummary& summary
 void PrintFile(const RenderOptions& options, const RenderedFile& file) {
   std::FILE* const out = options.out == "-" ? stderr : stdout;
   if (file.factor() != 1) {
-    absl::FPrintF(out, "the file has the sound times %.4g, with a peak of %s\n", file.factor(),
-                  Decibels(file.clipped_count() > 0 ? 1.0 : file.peak()));
+    absl::FPrintF(out, "the file has the sound times %.4g\n", file.factor());
   }
   if (file.clipped_count() > 0) {
     absl::FPrintF(out,
@@ -120,6 +112,7 @@ v1::RenderSettings SettingsOf(const RenderOptions& options) {
   settings.set_channel_count(options.channel_count);
   settings.set_tail_s(options.tail_s);
   if (options.full_scale_pa) settings.set_full_scale_pa(*options.full_scale_pa);
+  if (options.length_s) settings.set_longest_s(*options.length_s);
   return settings;
 }
 
@@ -139,7 +132,8 @@ RenderedForm FormOf(const RenderOptions& options, const std::string& path) {
 
 std::optional<double> BetterFullScale(const RenderOptions& options,
                                       const v1::RenderSummary& summary) {
-  const bool soft = summary.peak() > 0 && summary.peak() < kSoft;
+  const double peak = summary.peak_pa() / summary.full_scale_pa();
+  const bool soft = peak > 0 && peak < kSoft;
   const bool good = !soft && summary.limited_frame_count() == 0;
   if (!options.normalize || options.full_scale_pa || good) return std::nullopt;
   constexpr double kAbovePeak = 1.5;  // the limiter must not work
@@ -152,7 +146,14 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
     return Refusal(absl::StatusCode::kInvalidArgument, "TRACE_EMPTY",
                    absl::StrCat(path, ": ", warning.text()));
   }
-  return absl::OkStatus();
+  if (summary.rejected_count() == 0 || summary.accepted_count() > 0 || summary.peak_pa() > 0) {
+    return absl::OkStatus();
+  }
+  v1::ErrorInfo error = summary.last_rejection();
+  error.set_message(absl::StrCat("nothing sounds, because all contacts were rejected (",
+                                 summary.rejected_count(),
+                                 "), the last one so: ", error.message()));
+  return FromErrorInfo(absl::StatusCode::kInvalidArgument, error);
 }
 
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
@@ -183,6 +184,7 @@ absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderO
   if (!summary.ok()) return summary.status();
   RETURN_IF_ERROR(file.Finish());
   RETURN_IF_ERROR(CheckHasContacts(options.trace, *summary));
+  file.Describe(*summary);
   if (!options.html.empty()) {
     page.summary = *summary;
     RETURN_IF_ERROR(WriteTracePage(daemon, page, options.html));

@@ -248,8 +248,9 @@ absl::Status StrikeToFile(const client::Client& daemon, const StrikeOptions& opt
   rendering.out = options.out;
   rendering.normalize = options.normalize;
   rendering.length_s = options.seconds;
-  return Render(daemon, rendering, json, ModeMembers(ModesOf(model, material, options.size)))
-      .status();
+  std::vector<JsonMember> members = ModeMembers(ModesOf(model, material, options.size));
+  members.push_back(MaterialMember(material, object.material()));
+  return Render(daemon, rendering, json, std::move(members)).status();
 }
 
 }  // namespace

@@ -72,7 +72,13 @@ std::string UnknownWord(const CLI::App& app, int argc, const char* const* argv) 
         if (i + 1 < argc && absl::string_view(argv[i + 1]).substr(0, 2) != "--") ++i;
       }
     } else if (const std::vector<std::string> names = CommandNames(*path.back()); !names.empty()) {
-      if (std::ranges::find(names, word) == names.end()) return Suggestion("command", word, names);
+      const bool known = std::ranges::find(names, word) != names.end();
+      if (!known && path.back()->get_name() == "material") {
+        return absl::StrCat("there is no command '", word,
+                            "'; `carillon material` lists the materials, and `carillon material "
+                            "oak` shows one");
+      }
+      if (!known) return Suggestion("command", word, names);
       path.push_back(path.back()->get_subcommand(word));
     }
   }

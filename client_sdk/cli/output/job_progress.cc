@@ -144,10 +144,12 @@ std::string RoughTime(double seconds) {
                            : absl::StrFormat("%.0f days", seconds / 86'400);
 }
 
-absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name) {
+absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name,
+                                          const std::function<void(const v1::Job&)>& on_state) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   std::string shown;
   auto job = daemon.WatchJob(name, [&](const v1::Job& state) {
+    if (on_state) on_state(state);
     if (terminal) {
       DrawProgressBar(state);
     } else if (Activity(state) != shown) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -26,7 +27,9 @@ std::string JobLine(const v1::Job& job, absl::Time now);
 std::string RoughTime(double seconds);
 
 /// Waits until a job ends (Client::WatchJob), and shows its progress on stderr: as a bar on a
-/// terminal, otherwise as a line for each phase.
-absl::StatusOr<v1::Job> WatchWithProgress(const client::Client& daemon, const std::string& name);
+/// terminal, otherwise as a line for each phase. Calls `on_state`, if given, with each state.
+absl::StatusOr<v1::Job> WatchWithProgress(
+    const client::Client& daemon, const std::string& name,
+    const std::function<void(const v1::Job&)>& on_state = nullptr);
 
 }  // namespace carillon::cli

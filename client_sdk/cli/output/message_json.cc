@@ -5,6 +5,8 @@
 
 #include <charconv>
 #include <nlohmann/json.hpp>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 namespace carillon::cli {
@@ -84,7 +86,17 @@ Json ToJson(const Message& message) {
 }
 
 void Append(const JsonMember& member, Json& object) {
-  std::visit([&](const auto& value) { object[member.name] = value; }, member.value);
+  if (const auto* const json = std::get_if<JsonText>(&member.value)) {
+    object[member.name] = Json::parse(json->text);
+    return;
+  }
+  std::visit(
+      [&](const auto& value) {
+        if constexpr (!std::is_same_v<decltype(value), const JsonText&>) {
+          object[member.name] = value;
+        }
+      },
+      member.value);
 }
 
 /// Text that is not UTF-8 gets a replacement character for each wrong byte.

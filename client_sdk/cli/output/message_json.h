@@ -15,11 +15,16 @@ namespace carillon::cli {
 /// value. The message must have no bytes and no Any.
 std::string MessageJson(const google::protobuf::Message& message);
 
+/// A value that is JSON already.
+struct JsonText {
+  std::string text;
+};
+
 /// A member of a JSON object that is no message of the contract.
 struct JsonMember {
   const char* name;
   std::variant<std::string, bool, uint64_t, double, std::vector<std::string>, std::vector<double>,
-               std::map<std::string, std::string>>
+               std::map<std::string, std::string>, JsonText>
       value;
 };
 

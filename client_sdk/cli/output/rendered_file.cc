@@ -10,7 +10,10 @@
 
 namespace carillon::cli {
 
-RenderedFile::RenderedFile(RenderedForm form) : form_(std::move(form)), factor_(form_.factor) {}
+RenderedFile::RenderedFile(RenderedForm form)
+    : form_(std::move(form)),
+      factor_(form_.factor),
+      loudness_(form_.format.sample_rate_hz, form_.format.channel_count) {}
 
 bool RenderedFile::Take(const client::AudioBlock& block) {
   if (!file_) Begin();
@@ -31,6 +34,16 @@ absl::Status RenderedFile::Finish() {
   if (file_ && status_.ok()) Write(true);
   if (form_.frame_count && status_.ok()) FillUp();
   return status_.ok() && file_ ? file_->Finish() : status_;
+}
+
+void RenderedFile::Describe(v1::RenderSummary& summary) const {
+  summary.set_frame_count(frame_count());
+  summary.set_peak(clipped_count_ > 0 ? 1 : peak_);
+  summary.set_true_peak(loudness_.true_peak());
+  summary.clear_integrated_lufs();
+  summary.clear_loudest_momentary_lufs();
+  if (const auto lufs = loudness_.integrated()) summary.set_integrated_lufs(*lufs);
+  if (const auto lufs = loudness_.loudest_momentary()) summary.set_loudest_momentary_lufs(*lufs);
 }
 
 void RenderedFile::Begin() {
@@ -65,8 +78,11 @@ void RenderedFile::Write(bool last) {
   for (float& sample : ready) {
     sample *= static_cast<float>(factor_);
     peak_ = std::max(peak_, std::abs(sample));
-    if (form_.format.clips() && std::abs(sample) > 1) ++clipped_count_;
+    if (!form_.format.clips() || std::abs(sample) <= 1) continue;
+    ++clipped_count_;
+    sample = std::copysign(1.0F, sample);
   }
+  loudness_.Add(ready);
   status_ = file_->Write(ready);
   written_count_ += count;
   samples_.erase(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(count));

@@ -8,7 +8,9 @@
 
 #include "absl/status/status.h"
 #include "carillon/audio.h"
+#include "carillon/v1/audio_service.pb.h"
 #include "client_sdk/cli/output/wave_file.h"
+#include "server/loudness/loudness_meter.h"
 
 namespace carillon::cli {
 
@@ -47,6 +49,9 @@ class RenderedFile {
   double factor() const { return factor_; }
   /// The largest magnitude of the samples in the file, before they are clipped.
   float peak() const { return peak_; }
+  /// Lets the summary of the rendering state the length, the peak and the loudness of the file in
+  /// place of those of the sound before it was cut and scaled. Call it when the file is complete.
+  void Describe(v1::RenderSummary& summary) const;
   /// Whether the sound was longer than the file.
   bool is_cut() const { return cut_; }
   /// Number of frames in the file. Call it when the file is complete.
@@ -71,6 +76,7 @@ class RenderedFile {
   bool cut_ = false;
   float peak_ = 0;
   uint64_t clipped_count_ = 0;
+  LoudnessMeter loudness_;
   std::vector<float> samples_;
   absl::Status status_;
 };

@@ -165,6 +165,15 @@ void AddTimeWarnings(const v1::StreamContactsResponse& report, Warnings& warning
   }
 }
 
+/// Adds the warning about contacts that were refused. `Report` is that of a stream or a rendering.
+template <class Report>
+void AddRejection(const Report& report, Warnings& warnings) {
+  if (report.rejected_count() == 0) return;
+  Add(warnings, "CONTACTS_REJECTED", report.rejected_count(),
+      absl::StrCat(Were(report.rejected_count()), " rejected, the last one with ",
+                   report.last_rejection().reason(), ": ", report.last_rejection().message()));
+}
+
 /// Adds the warnings about contacts that are never heard.
 void AddLossWarnings(const v1::StreamContactsResponse& report, Warnings& warnings) {
   if (report.dropped_count() > 0) {
@@ -173,11 +182,7 @@ void AddLossWarnings(const v1::StreamContactsResponse& report, Warnings& warning
                      " lost, because too many waited for the mixer, or because the object was "
                      "removed; send fewer contacts, and remove objects after their last contact"));
   }
-  if (report.rejected_count() > 0) {
-    Add(warnings, "CONTACTS_REJECTED", report.rejected_count(),
-        absl::StrCat(Were(report.rejected_count()), " rejected, the last one with ",
-                     report.last_rejection().reason(), ": ", report.last_rejection().message()));
-  }
+  AddRejection(report, warnings);
 }
 
 }  // namespace
@@ -238,6 +243,7 @@ void AddWarnings(const IntakeFindings& findings, v1::RenderSummary& summary) {
         "the trace holds no contact, so there is nothing to hear; record a simulation in which "
         "something is struck");
   }
+  AddRejection(summary, warnings);
   AddStepWarnings(findings, warnings);
   AddContactWarnings(findings, summary.accepted_count(), warnings);
 }

@@ -58,6 +58,7 @@ absl::Status TraceReader::TakeSettings(const v1::RenderSettings& settings) {
   settings_.emplace();
   if (settings.sample_rate_hz() != 0) settings_->sample_rate_hz = settings.sample_rate_hz();
   settings_->tail_s = settings.tail_s();
+  settings_->longest_s = settings.longest_s();
   settings_->tells_blows = settings.tell_blows();
   if (settings.has_gain()) settings_->gain = settings.gain();
   if (settings.has_full_scale_pa()) settings_->full_scale_pa = settings.full_scale_pa();

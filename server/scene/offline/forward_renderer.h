@@ -33,6 +33,9 @@ struct OfflineSettings {
   /// -80 dB of full scale and 60 dB below its peak, and after 60 s at the latest. Only
   /// OfflineRenderer uses it.
   double tail_s = 0;
+  /// The tail ends at this time from the first frame at the latest, seconds; zero for no such time.
+  /// Only OfflineRenderer uses it.
+  double longest_s = 0;
   double gain = 1;                      ///< gain of the whole sound, before the limiter
   double full_scale_pa = kFullScalePa;  ///< the pressure of a sample of 1
   /// The simulator's step, seconds, above 0 and at most 1.

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kLongestTailS = 120;
 constexpr double kLongestOpenTailS = 60;
+constexpr double kMostLongestS = 1e5;
 /// The sound has ended below -80 dB of full scale, if that is also 60 dB below its peak.
 constexpr float kQuiet = 1e-4F;
 constexpr float kQuietOfPeak = 1e-3F;
@@ -37,6 +38,11 @@ absl::StatusOr<std::unique_ptr<OfflineRenderer>> OfflineRenderer::Make(
     return Refusal(
         absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
         absl::StrCat("tail_s is ", settings.tail_s, "; it must be 0 to ", kLongestTailS));
+  }
+  if (!(settings.longest_s >= 0 && settings.longest_s <= kMostLongestS)) {
+    return Refusal(
+        absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
+        absl::StrCat("longest_s is ", settings.longest_s, "; it must be 0 to ", kMostLongestS));
   }
   ASSIGN_OR_RETURN(std::unique_ptr<ForwardRenderer> forward,
                    ForwardRenderer::Make(settings, bodies, transfers));
@@ -120,9 +126,15 @@ uint64_t OfflineRenderer::EndFrame() const {
   const OfflineSettings& settings = forward_->settings();
   const bool is_given = settings.tail_s > 0;
   const double tail_s = is_given ? settings.tail_s : kLongestOpenTailS;
-  return forward_->last_contact_frame() +
-         static_cast<uint64_t>(std::ceil(tail_s * settings.sample_rate_hz)) -
-         (is_given ? FadeFrames() : 0);
+  const uint64_t contact = forward_->last_contact_frame();
+  const uint64_t end = contact +
+                       static_cast<uint64_t>(std::ceil(tail_s * settings.sample_rate_hz)) -
+                       (is_given ? FadeFrames() : 0);
+  if (settings.longest_s == 0) return end;
+  const uint64_t longest =
+      settings.mapping.first_frame +
+      static_cast<uint64_t>(std::ceil(settings.longest_s * settings.sample_rate_hz));
+  return std::min(end, std::max(contact, longest));
 }
 
 size_t OfflineRenderer::FadeFrames() const {

@@ -38,6 +38,9 @@ struct Written {
     }
     EXPECT_TRUE(file.Finish().ok());
     cut = file.is_cut();
+    summary.set_frame_count(sound.size());
+    summary.set_integrated_lufs(-70);
+    file.Describe(summary);
     samples.resize(file.frame_count());
     std::ifstream in(form.path, std::ios::binary);
     const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
@@ -49,6 +52,7 @@ struct Written {
 
   std::vector<float> samples;
   bool cut = false;
+  v1::RenderSummary summary;
 };
 
 TEST(RenderedFile, ALongerSoundIsCutAndFadesOut) {
@@ -90,6 +94,44 @@ TEST(RenderedFile, ThePeakOfAFileThatIsCutIsThatOfItsOwnSamples) {
   form.normalize = true;
   const Written written(sound, 64, form);
   EXPECT_FLOAT_EQ(*std::ranges::max_element(written.samples), 0.9F);
+}
+
+TEST(RenderedFile, TheLoudnessIsThatOfTheSamplesInTheFile) {
+  constexpr uint64_t kRate = 48000, kLength = kRate;
+  std::vector<float> sound(3 * kRate);
+  for (size_t i = 0; i < sound.size(); ++i) {
+    const double t = static_cast<double>(i) / kRate;
+    sound[i] = static_cast<float>(0.01 * std::exp(-t) * std::sin(2 * std::numbers::pi * 997 * t));
+  }
+  for (const bool normalize : {false, true}) {
+    RenderedForm form = FormOf(kLength, 480);
+    form.normalize = normalize;
+    const Written written(sound, 4096, form);
+    LoudnessMeter meter(kRate, 1);
+    meter.Add(written.samples);
+    EXPECT_EQ(written.summary.frame_count(), kLength);
+    EXPECT_FLOAT_EQ(static_cast<float>(written.summary.peak()),
+                    std::abs(*std::ranges::max_element(
+                        written.samples, {}, [](float sample) { return std::abs(sample); })));
+    EXPECT_NEAR(written.summary.integrated_lufs(), meter.integrated().value(), 1e-9);
+    EXPECT_NEAR(written.summary.loudest_momentary_lufs(), meter.loudest_momentary().value(), 1e-9);
+    EXPECT_NEAR(written.summary.true_peak(), meter.true_peak(), 1e-9);
+  }
+}
+
+TEST(RenderedFile, ThePeakOfAClippedFileIsFullScale) {
+  RenderedForm form = FormOf(48000);
+  form.path = testing::TempDir() + "Clipped" + std::to_string(getpid()) + ".wav";
+  form.factor = 4;
+  RenderedFile file(form);
+  const std::vector<float> sound(48000, 0.5F);
+  EXPECT_TRUE(file.Take({.sample_rate_hz = 48000, .channel_count = 1, .samples = sound}));
+  EXPECT_TRUE(file.Finish().ok());
+  std::filesystem::remove(form.path);
+  v1::RenderSummary summary;
+  file.Describe(summary);
+  EXPECT_EQ(summary.peak(), 1);
+  EXPECT_EQ(file.clipped_count(), 48000U);
 }
 
 TEST(RenderedFile, AFadeAsLongAsTheFileBeginsAtItsBeginning) {

@@ -7,6 +7,7 @@ repeats one.
 
 import hashlib
 import json
+import math
 import os
 import pathlib
 import random
@@ -21,6 +22,7 @@ import numpy
 import carillon
 import meshes
 import sound
+from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2
 from daemon import BIN, ROOT, DaemonTest
 
 CLIP_COUNT = int(os.environ.get("CARILLON_CLIPS", "12"))
@@ -223,6 +225,75 @@ class ClipsTest(DaemonTest):
         self.assertEqual(list(out.glob(".work-*")), [])
         self.run_ended(self.render(out, "--stems"))
         self.assertEqual(contents(out), self.expected)
+
+    def test_the_loudness_of_a_clip_is_that_of_its_file(self):
+        out = self.new_folder()
+        plain = manifest(self.whole)
+        self.run_ended(self.render(out, "--normalize"))
+        for line, before in zip(manifest(out), plain):
+            peaks = [numpy.abs(sound.read_wave(folder / line["file"])).max() for folder in (out, self.whole)]
+            self.assertAlmostEqual(peaks[0], 0.9, places=4)
+            raised_db = 20 * numpy.log10(peaks[0] / peaks[1])
+            self.assertAlmostEqual(line["integrated_lufs"] - before["integrated_lufs"], raised_db, delta=0.3)
+        self.run_ended(self.render(out, "--length", 0.3))
+        self.assertTrue(all("integrated_lufs" not in line for line in manifest(out)))  # R 128 needs 0.4 s
+
+    def write_bar(self, folder, name, *contacts, **object_fields):
+        folder.mkdir(parents=True, exist_ok=True)
+        item = contact_trace_pb2.ContactTraceObject(handle=3, modal_model=self.model, **object_fields)
+        sound.write_trace(folder / f"{name}.contacts", [item],
+                          [contact_pb2.ContactStep(time_s=0, contacts=list(contacts))])
+
+    def test_rejected_contacts_are_a_warning_and_an_error_where_nothing_else_sounds(self):
+        traces, out = self.new_folder(), self.new_folder()
+        point, blow = (0.1, 0.01, 0.01), (0, 0, -0.02)
+        good, foreign = (sound.impulse(point, blow, handle) for handle in (3, 9))
+        nowhere = sound.impulse((math.nan, 0, 0), blow, 3)
+        for name, contacts in (("some", (good, foreign)), ("unknown", (foreign,)), ("nowhere", (nowhere, nowhere))):
+            self.write_bar(traces, name, *contacts)
+        failed = self.run_ended(self.render(out, traces=traces), 1)
+        self.assertIn("SOME_FAILED: 2 clips", failed.stderr)
+        self.assertIn("CONTACTS_REJECTED in 1 clip", failed.stdout)
+        nowhere, some, unknown = manifest(out)
+        self.assertEqual((nowhere["error"]["reason"], unknown["error"]["reason"]),
+                         ("CONTACT_MALFORMED", "OBJECT_NOT_FOUND"))
+        self.assertIn("all contacts were rejected (2)", nowhere["error"]["message"])
+        self.assertEqual(some["rejected_count"], 1)
+        warning, = some["warnings"]
+        self.assertEqual((warning["id"], warning["count"]), ("CONTACTS_REJECTED", 1))
+        self.assertIn("OBJECT_NOT_FOUND", warning["text"])
+        one = self.daemon.command("render", traces / "unknown.contacts", "--out", self.folder / "one.wav", check=False)
+        self.assertEqual(one.returncode, 1)
+        self.assertIn("OBJECT_NOT_FOUND: nothing sounds", one.stderr)
+
+    def test_a_clip_is_rendered_again_with_another_material_or_transfer(self):
+        traces, out = self.new_folder(), self.new_folder()
+        self.write_bar(traces, "bar", sound.impulse((0.1, 0.01, 0.01), (0, 0, -0.02), 3))
+        self.write_bar(traces, "own", sound.impulse((0.1, 0.01, 0.01), (0, 0, -0.02), 3),
+                       material=material_pb2.Material(preset="brass"))
+        def run():
+            told = json.loads(self.run_ended(self.render(out, "--json", traces=traces)).stdout)
+            return told, [line["objects"][0] for line in manifest(out)], manifest(out)[0]["sha256"]
+        self.addCleanup(self.daemon.command, "model", "tag", self.model, "--material", meshes.MATERIAL)
+        self.daemon.command("model", "tag", self.model, "--material", "oak")
+        told, (bar, own), first = run()
+        self.assertEqual((told["rendered"], told["kept"]), (2, 0))
+        self.assertEqual((bar["material"], own["material"]), ("oak", "brass"))
+        shown = json.loads(self.daemon.command("--json", "material", "oak").stdout)["material"]
+        self.assertEqual(bar["material_figures"]["young_pa"], shown["young_pa"])
+        self.assertEqual((bar["transfer"], own["transfer"]), (False, False))
+        self.assertIn("2 clips with objects sounding by the paper's coupling", told["warnings"][0])
+        self.daemon.command("model", "tag", self.model, "--material", "pine")
+        told, (bar, own), second = run()
+        self.assertEqual((told["rendered"], told["kept"], bar["material"]), (1, 1, "pine"))
+        self.assertNotEqual(first, second)
+        self.daemon.command("transfer", self.model, "--material", "pine", "--budget", 1, "--wait")
+        told, (bar, own), third = run()
+        self.assertEqual((told["rendered"], told["kept"]), (1, 1))
+        self.assertEqual((bar["transfer"], own["transfer"]), (True, False))
+        self.assertNotEqual(second, third)
+        told, _, _ = run()
+        self.assertEqual((told["rendered"], told["kept"]), (0, 2))
 
     def test_stems_add_up_to_the_clip(self):
         for line in manifest(self.whole)[:3]:

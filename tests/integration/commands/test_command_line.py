@@ -113,6 +113,8 @@ class ListsTest(CommandLineTest):
         self.assertRegex(self.run_command("material", "bell_bronze"), r"source +\w")
         unknown = self.daemon.command("material", "bell_bronce", check=False)
         self.assertRegex(unknown.stderr, "UNKNOWN_MATERIAL: .*bell_bronze")
+        for words in (("list",), ("show", "oak")):
+            self.assertIn("`carillon material` lists", self.daemon.command("material", *words, check=False).stderr)
 
     def test_scenes_are_listed_with_their_objects_and_deleted(self):
         scene = self.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
@@ -211,7 +213,17 @@ class ReportTest(CommandLineTest):
             self.assertEqual((row["frequencies_hz"], row["t60_s"]), (shown["frequencies_hz"], shown["t60_s"]))
             self.assertGreater(row["node_count"], 0)
             self.assertEqual(row["warnings"], shown["header"]["warnings"])
+            self.assertEqual(row["material"]["preset"], meshes.MATERIAL)
         self.assertEqual(rows[0]["label"], "gläserne Glocke 鐘")
+        self.assertGreater(rows[0]["seconds"], 0)
+        self.assertEqual(rows[2]["seconds"], 0)  # was there already
+        unknown = carillon("--server", self.daemon.server, "--json", "model", "create",
+                           *(self.folder / name for name in names), "--material", "oack")
+        self.assertEqual(unknown.stderr.count("UNKNOWN_MATERIAL"), 1)
+        self.assertLess(len(unknown.stderr), 300)
+        error = json.loads(unknown.stdout)["error"]
+        self.assertEqual(error["metadata"]["nearest"], "oak")
+        self.assertIn("pine", error["metadata"]["names"].split(","))
         self.assertEqual(done.stdout.split(), [rows[i]["modal_model"] for i in order if i % 2 == 0])
 
     def test_a_slow_body_keeps_neither_a_row_nor_a_repair_waiting(self):
@@ -258,6 +270,10 @@ class ReportTest(CommandLineTest):
                                 "--normalize", *options)
             heard = sound.read_wave(file)[:, 0]
             self.assertEqual((told["file"], told["seconds"]), (str(file), len(heard) / 48000))
+            self.assertEqual((told["frame_count"], told["peak"]), (len(heard), told["file_peak"]))
+            self.assertGreater(told["integrated_lufs"], -30)
+            self.assertEqual(told["material"]["preset"], meshes.MATERIAL)
+            self.assertGreater(told["material"]["density_kg_per_m3"], 0)
             self.assertEqual(len(heard), frames or len(heard))
             self.assertAlmostEqual(numpy.abs(heard).max(), 0.9, places=4)
             spectrum = numpy.abs(numpy.fft.rfft(heard[:24000] * numpy.blackman(48000)[24000:]))
@@ -322,6 +338,14 @@ class RenderTest(CommandLineTest):
         soft = sound.read_wave(self.render("--normalize"))
         # Without the second rendering, the modes would end at a hundredth of the peak.
         numpy.testing.assert_allclose(soft, plain, atol=1e-4)
+
+    def test_a_length_bounds_the_tail_that_is_rendered(self):
+        with carillon_package.connect(self.daemon.server) as client:
+            whole = client.render(self.trace).samples
+            short = client.render(self.trace, longest_s=0.1).samples
+        self.assertEqual(len(short), round(0.11 * sound.RATE))  # the last 10 ms fade out
+        self.assertGreater(len(whole), 2 * len(short))
+        numpy.testing.assert_array_equal(short[:4800], whole[:4800])
 
     def test_a_dash_writes_the_file_to_stdout(self):
         file = self.render().read_bytes()

@@ -172,12 +172,12 @@ class ClientCalls(Connection, Generic[AnyModel, AnyJob, AnyScene, AnyRecording, 
     async def render(self, /, trace: Trace | str | os.PathLike[str], *, normalize: bool = False,
                      timeout: Optional[float] = None, **settings: Any) -> Sound:
         """Renders a trace, or a .contacts file, faster than real time unless live sound and decompositions need the
-        processors, to which a rendering yields. `settings` are fields of RenderSettings:
-        sample_rate_hz, channel_count, tail_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of
-        0.9. A sound that peaks below -40 dB of full scale, or that the limiter changed, is then rendered again with a
-        full scale a little above its peak, unless `full_scale_pa` is given, because modes end at -140 dB of full
-        scale. Raises CarillonError if a contact is rejected, if there is none (TRACE_EMPTY), or if the rendering has
-        not ended after `timeout` seconds (DEADLINE_EXCEEDED)."""
+        processors, to which a rendering yields. `settings` are fields of RenderSettings: sample_rate_hz, channel_count,
+        tail_s, longest_s, gain, full_scale_pa and tell_blows. `normalize` gives the sound a peak of 0.9. A sound that
+        peaks below -40 dB of full scale, or that the limiter changed, is then rendered again with a full scale a little
+        above its peak, unless `full_scale_pa` is given, because modes end at -140 dB of full scale. Raises
+        CarillonError if a contact is rejected, if there is none (TRACE_EMPTY), or if the rendering has not ended after
+        `timeout` seconds (DEADLINE_EXCEEDED)."""
         whole = trace if isinstance(trace, Trace) else Trace.read(trace)
         return await rendering.render(self, whole, settings, normalize, timeout)
 

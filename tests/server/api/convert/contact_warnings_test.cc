@@ -147,7 +147,8 @@ TEST(ContactWarnings, ARenderingHasThoseAboutItsContacts) {
   AddWarnings({.engine = {.blow_count = 1}, .distant_point_count = 1, .largest_distance_m = 2},
               summary);
   EXPECT_THAT(ToldBy(summary.warnings()),
-              ElementsAre(Told{"POINTS_DISTANT", 1, {{"largest_distance_m", 2}}}));
+              ElementsAre(Told{"CONTACTS_REJECTED", 1, {}},
+                          Told{"POINTS_DISTANT", 1, {{"largest_distance_m", 2}}}));
 }
 
 }  // namespace
