@@ -38,6 +38,10 @@ git ls-files -z --cached --others --exclude-standard | tar --null --ignore-faile
 find "$source" -exec touch --no-dereference --date="@$(git log -1 --format=%ct)" {} +
 tar -cJf "$folder/carillon_$version.tar.xz" -C "$scratch" --sort=name --owner=0 --group=0 "carillon-$version"
 
+# The zip needs neither a build nor debhelper.
+cp -r "$source/client_sdk/blender" "$scratch/carillon_blender"
+(cd "$scratch" && python3 -m zipfile -c "$folder/carillon_blender-$version.zip" carillon_blender)
+
 debian=$source/debian
 cp -r "$source/deploy/debian" "$debian"
 sed "s/@VERSION@/$version/" "$debian/SOURCE.in" >"$debian/SOURCE"
@@ -58,8 +62,6 @@ dpkg-buildpackage --build=binary --no-sign --no-check-builddeps >"$scratch/log" 
 }
 [[ $version != "$own_version" ]] || lintian --fail-on error --tag-display-limit 0 "$scratch"/*.deb
 cp "$scratch"/*.deb "$folder"
-cp -r "$source/client_sdk/blender" "$scratch/carillon_blender"
-(cd "$scratch" && python3 -m zipfile -c "$folder/carillon_blender-$version.zip" carillon_blender)
 (cd "$source/client_sdk/python" && /usr/bin/python3 setup.py --quiet bdist_wheel --dist-dir "$folder" >/dev/null)
 # The indexes let apt use the folder as a repository.
 cd "$folder"

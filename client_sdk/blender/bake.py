@@ -41,6 +41,7 @@ class Bake:
             [bpy.app.binary_path, "--background", "--factory-startup", *scripts, os.fspath(copy),
              "--python-exit-code", "1", "--python-expr", code],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=self.log, text=True, start_new_session=True,
+            preexec_fn=programs.end_with_parent,
             env=os.environ | {"TMPDIR": os.fspath(self.folder)})  # so that nothing is left of a bake that is ended
         self.lines = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
@@ -70,10 +71,10 @@ class Bake:
                         (self.folder / "log").read_text(errors="replace").strip()[-500:])
         if "reason" in self.result:
             raise Fault(self.result["reason"], self.result["message"], self.result["bodies"])
-        strip.keep(self.scene, self.folder)
+        placed = strip.keep(self.scene, self.folder)
         self.scene.carillon.baked = self.baked
         freshness.look(self.scene)
-        return "\n".join([*self.result["done"], "From " + self.result["how"]])
+        return "\n".join([*self.result["done"], *placed, "From " + self.result["how"]])
 
     def end(self):
         """Ends the worker with all that it has started, and removes the files."""

@@ -59,6 +59,16 @@ def taking_part(scene):
     return sorted(rigid + others, key=lambda obj: obj.name)
 
 
+def check_scales(objects):
+    """Refuses bodies that the simulator would turn over."""
+    names = [obj.name for obj in objects if obj.rigid_body and is_free(obj) and (
+        min(obj.scale) < 0 or obj.matrix_world.determinant() < 0)]
+    if names:
+        raise Fault("SCALE_NEGATIVE", f"{', '.join(names)}: the scale is negative, which the simulator takes for a "
+                                      "turn: choose Object > Apply > Scale, and Mesh > Normals > Recalculate Outside",
+                    names)
+
+
 def rotation(matrices):
     """The rotations (..., 3, 3) of matrices whose columns are scaled, and may be mirrored or sheared."""
     linear = numpy.asarray(matrices, float)[..., :3, :3]
@@ -98,12 +108,14 @@ def _surface(obj):
 
 
 def _placed(obj, depsgraph, back):
-    """The surface in the frame that `back` leads to from the world; a mirrored one is turned inside out again."""
+    """The surface in the frame that `back` leads to from the world; one that is inside out, as by a mirror or flipped
+    normals, is turned, since its volume gives the mass."""
     vertices, triangles = _surface(obj.evaluated_get(depsgraph))
     matrix = back @ numpy.asarray(obj.matrix_world, float)
-    if numpy.linalg.det(matrix[:3, :3]) < 0:
+    placed = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    if len(triangles) and numpy.linalg.det((placed - placed.mean(0))[triangles]).sum() < 0:
         triangles = triangles[:, ::-1]
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], triangles
+    return placed, triangles
 
 
 def deforms(obj, scene, frames):
@@ -121,8 +133,16 @@ def deforms(obj, scene, frames):
     return False
 
 
-def _hints(obj, vertices):
+def _hints(obj, vertices, final):
+    """Of the mesh that the simulator takes, and of the mesh with all modifiers."""
     rigid = obj.rigid_body
+    scale = obj.matrix_world.to_scale()
+    if is_free(obj) and max(scale) > 1.01 * min(scale):
+        yield ("its scale is not applied, and the simulator turns it as if it had none: Object > Apply > Scale, if it "
+               "turns too slowly or too fast")
+    away = numpy.abs(numpy.ptp(vertices, 0) - numpy.ptp(final, 0)).max() if len(vertices) and len(final) else 0
+    if rigid.mesh_source != 'FINAL' and away > 1e-3 * numpy.ptp(final, 0).max():
+        yield ("the simulator takes its mesh before the modifiers: choose Final in Rigid Body > Collisions > Source")
     if shapes.is_off_centre(rigid, vertices):
         yield (f"the simulator puts the shape {rigid.collision_shape.title()} around the object's origin, which is not "
                "in the middle of its mesh: Object > Set Origin > Origin to Geometry")
@@ -137,7 +157,7 @@ def _read_simulated(body, obj, depsgraph, scale, time_scale):
     of = obj.evaluated_get(depsgraph) if rigid.mesh_source == 'FINAL' else obj
     vertices, triangles = _surface(of)
     body.friction = rigid.friction
-    body.hints = list(_hints(obj, vertices))
+    body.hints = list(_hints(obj, vertices, _surface(obj.evaluated_get(depsgraph))[0]))
     if rigid.collision_shape != 'COMPOUND':
         own_scale = numpy.linalg.norm(numpy.asarray(obj.matrix_world, float)[:3, :3], axis=0)
         body.collider, rounding = shapes.collider(rigid, vertices, triangles, own_scale)

@@ -22,6 +22,7 @@ class Motion:
     how: str                 # what the poses are, as text
     steps: bool = False      # each frame is a step of the simulation
     shown: tuple = (1, 24)   # the scene's first frame, and its frames a second
+    hints: list = dataclasses.field(default_factory=list)  # what of the whole simulation may look odd
 
     def write(self, path, scene):
         scale = settings.metres_per_unit(scene)
@@ -41,14 +42,24 @@ def read(scene, tell):
                                      "and New alike")
     objects = bodies.taking_part(scene)
     if not objects:
-        raise Fault("NO_BODY", f"{scene.name} has no rigid body, and no object has a material of Carillon: give the "
-                               "objects that sound a material, and their floor the material none")
+        raise Fault("NO_BODY", world_is_off(scene) or
+                    f"{scene.name} has no rigid body, and no object has a material of Carillon: give the "
+                    "objects that sound a material, and their floor the material none")
+    bodies.check_scales(objects)
     free = [obj for obj in objects if obj in bodies.in_world(scene) and bodies.is_free(obj)]
     tell(0.05, "Reading the animation")
     shown = scene.frame_start, rebake.frames_per_s(scene)
     found = _read_simulated(scene, objects, free, tell) if free else _read_keyed(scene, objects)
     found.shown = shown
     return found
+
+
+def world_is_off(scene):
+    """What to do about a simulation that does not run, or an empty text."""
+    world = scene.rigidbody_world
+    if world is None or world.enabled or not any(obj.rigid_body for obj in scene.objects):
+        return ""
+    return "the simulation is switched off: tick Scene properties > Rigid Body World"
 
 
 def _check_rigid(scene, objects):
@@ -102,6 +113,10 @@ def _read_simulated(scene, objects, free, tell):
     scene.frame_set(begin)
     surfaces = _surfaces(scene, objects, seen, True)
     matrices, how = seen, "the frames of the simulation"
+    hints, is_baked = [], cache.is_baked
+    if last < scene.frame_end:
+        hints.append(f"the simulation's cache ends at frame {last}, before the scene does, and what moves stops there: "
+                     "set Rigid Body World > Cache > End")
     if steps % n == 0:
         tell(0.15, "Simulating each step as a frame")
         rows = [objects.index(obj) for obj in free]
@@ -111,11 +126,14 @@ def _read_simulated(scene, objects, free, tell):
         apart = numpy.abs(fine[:, ::n] - seen[rows, start - begin:]).max((0, 2, 3))
         alike = apart.max() <= ALIKE_M / settings.metres_per_unit(bpy.context.scene)
         how = _comparison(apart, start, alike, "each step" if n == steps else f"{n} steps for each frame")
+        if is_baked and not alike:
+            hints.append("the simulation was baked before something was changed: Rigid Body World > Cache > Delete "
+                         "Bake, and bake it again")
         if alike:
             matrices = _between(seen, n)
             matrices[rows, (start - begin) * n:] = fine
     n = n if matrices is not seen else 1
-    return Motion(surfaces, matrices[:, (shown - begin) * n:], n * rate, how, n == steps)
+    return Motion(surfaces, matrices[:, (shown - begin) * n:], n * rate, how, n == steps, hints=hints)
 
 
 def _comparison(apart, start, alike, steps):

@@ -2,8 +2,10 @@
 """The programs of Carillon that the add-on runs: `carillon`, and `carillond` where none answers."""
 
 import contextlib
+import ctypes
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import threading
@@ -15,6 +17,15 @@ class Fault(Exception):
     def __init__(self, reason, message, bodies=()):
         super().__init__(f"{reason}: {message}")
         self.reason, self.message, self.bodies = reason, message, bodies
+
+
+_libc = ctypes.CDLL(None)
+PR_SET_PDEATHSIG = 1
+
+
+def end_with_parent():
+    """Called in a new process: it ends when the process that has started it does, however that one ends."""
+    _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def find(name):
@@ -40,7 +51,8 @@ def daemon():
         server = f"unix:{folder}/socket"
         with open(f"{folder}/log", "w+", encoding="utf-8") as log:
             process = subprocess.Popen([find("carillond"), "--listen", server, "--audio-device", "null",
-                                        "--no-transfers"], stdout=subprocess.PIPE, stderr=log, text=True)
+                                        "--no-transfers"], stdout=subprocess.PIPE, stderr=log, text=True,
+                                       preexec_fn=end_with_parent)
             try:
                 if not process.stdout.readline().startswith("listening on "):
                     log.seek(0)

@@ -34,7 +34,7 @@ def folder_of(scene):
 
 def keep(scene, made):
     """Moves sound.wav and the stems from the folder `made` to the scene's, and puts them into the sequencer in place of
-    those of an earlier bake, whose channel, volume and place they keep."""
+    those of an earlier bake, whose channel, volume and place they keep. Returns lines for the report."""
     folder = folder_of(scene)
     try:
         shutil.rmtree(folder / "stems", ignore_errors=True)
@@ -50,9 +50,21 @@ def keep(scene, made):
         _strips(scene).remove(strip)
         if sound and sound.users == 0:
             bpy.data.sounds.remove(sound)
-    _add(scene, "sound", folder / "sound.wav", before, scene.carillon.channel)
-    for number, stem in enumerate(sorted((folder / "stems").glob("*.wav"))):
-        _add(scene, re.sub(r"^\d+-", "", stem.stem), stem, before, scene.carillon.channel + 1 + number, mute=True)
+    channel = _add(scene, "sound", folder / "sound.wav", before, scene.carillon.channel)
+    last = channel
+    for stem in sorted((folder / "stems").glob("*.wav")):
+        last = _add(scene, re.sub(r"^\d+-", "", stem.stem), stem, before, last + 1, mute=True)
+    if "sound" in before or channel == scene.carillon.channel:
+        return []
+    return [f"The strip is on channel {channel}: other strips are on channel {scene.carillon.channel}"]
+
+
+def _free_channel(scene, channel, start):
+    """The first channel from `channel` on where no strip is during a sound that starts at a frame."""
+    end = start + scene.frame_end - scene.frame_start + 1
+    taken = {strip.channel for strip in _strips(scene) if strip.frame_final_start < end and
+             strip.frame_final_end > start}
+    return next((free for free in range(channel, 33) if free not in taken), 32)
 
 
 def _placed(strip):
@@ -61,9 +73,11 @@ def _placed(strip):
 
 
 def _add(scene, name, path, before, channel, mute=False):
+    """Adds a strip and returns its channel."""
     kept = before.get(name, {"channel": channel, "mute": mute})
+    start = scene.frame_start + kept.get("moved", 0)
     strip = _strips(scene).new_sound("Carillon" if name == "sound" else f"Carillon {name}", os.fspath(path),
-                                     min(kept["channel"], 32), scene.frame_start + kept.get("moved", 0))
+                                     _free_channel(scene, kept["channel"], start), start)
     strip[KEY], strip[BAKED] = name, scene.frame_start
     for key, value in kept.items():
         if key not in ("channel", "moved"):
@@ -72,3 +86,4 @@ def _add(scene, name, path, before, channel, mute=False):
         strip.sound.filepath = bpy.path.relpath(os.fspath(path))
     else:
         strip.sound.pack()
+    return strip.channel

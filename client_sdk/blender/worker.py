@@ -5,14 +5,16 @@ the motion, and `carillon foley`. It prints a line of JSON for each stage, and o
 import json
 import pathlib
 import re
+import shutil
 import subprocess
 
 import bpy
 
-from . import motion, programs, settings, shapes
+from . import motion, notes, programs, settings, shapes
 from .programs import Fault
 
 MARK = "carillon-bake: "
+FEW = 10
 
 
 # What the advice of `carillon foley`, which names its options, is in Blender.
@@ -43,8 +45,11 @@ def main(folder):
             scene = bpy.context.scene
             found.write(folder / "motion.glb", scene)
             report = _foley(server, scene, found, gravity, folder)
-        hints = [f"warning: {body.name}: {hint}" for body in found.bodies for hint in body.hints]
-        tell(done=report + hints, how=found.how)
+        hints = [f"warning: {hint}" for hint in found.hints]
+        hints += [f"warning: {body.name}: {hint}" for body in found.bodies for hint in body.hints]
+        if not scene.carillon.stems:
+            shutil.rmtree(folder / "stems", ignore_errors=True)
+        tell(done=report + hints + notes.of(scene, found), how=found.how)
     except Fault as fault:
         tell(reason=fault.reason, message=fault.message, bodies=list(fault.bodies))
 
@@ -72,7 +77,7 @@ def _check_materials(found):
 def _causes(scene, found, name, reason):
     """What makes Blender move a body as no contacts do, and what to do about it."""
     body = next((body for body in found.bodies if body.name == name), None)
-    causes = list(body.hints) if body else []
+    causes = found.hints + (body.hints if body else [])
     for obj in scene.objects:
         held = obj.rigid_body_constraint
         if held and held.enabled and any(end and end.name == name for end in (held.object1, held.object2)):
@@ -86,7 +91,12 @@ def _causes(scene, found, name, reason):
     if body and not body.mass:
         causes.append("it is keyed, and must move as a body falls and strikes: eased or bent keys do not, and a turn "
                       "by hand does not")
-    if reason == "MOTION_WITHOUT_CONTACT":
+    obj = bpy.data.objects.get(name)
+    if obj and obj.animation_data and obj.animation_data.action and obj.animation_data.action.fcurves.find(
+            "rigid_body.kinematic"):
+        causes.append("Animated is keyed, and a body that is moved at first and simulated later must move all the time "
+                      "as bodies fall: keep it still or let it fall from the first frame on, or split the scene")
+    if reason == "MOTION_WITHOUT_CONTACT" and not causes:
         causes.append("if a floor without a rigid body is there, give it the material none")
     return "; ".join(causes or ["something else than contacts and gravity moves it, such as a force field"])
 
@@ -101,6 +111,11 @@ def _in_blender(text, found):
     return re.sub(r"\(?--(wall|repair)\b\)?", lambda option: option[1].title(), text)
 
 
+def _are_few(found):
+    """True if the stems take so little time that they are rendered, wanted or not, to name bodies that nobody hears."""
+    return len(found.bodies) <= FEW
+
+
 def _words(scene, found, folder):
     chosen = scene.carillon
     # A movie ends with its last frame, so that the sound ends there, too.
@@ -111,7 +126,7 @@ def _words(scene, found, folder):
     words += ["--normalize"] if chosen.normalize else []
     words += ["--frames-are-steps"] if found.steps else []
     words += ["--force"] if chosen.force else []
-    words += ["--stems", folder / "stems"] if chosen.stems else []
+    words += ["--stems", folder / "stems"] if chosen.stems or _are_few(found) else []
     words += ["--listener", "camera"] if chosen.use_camera and scene.camera else []
     for body in found.bodies:
         of = bpy.data.objects[body.name].carillon
@@ -126,15 +141,18 @@ def _foley(server, scene, found, gravity, folder):
     tell(progress=0.3, text="Finding the contacts")
     process = subprocess.Popen(
         [programs.find("carillon"), *server, "foley", folder / "motion.glb", *_words(scene, found, folder),
-         "--gravity=" + ",".join(map(str, gravity))], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    lines = []
+         "--gravity=" + ",".join(map(str, gravity))], stdout=open(folder / "summary", "w", encoding="utf-8"),
+        stderr=subprocess.PIPE, text=True, preexec_fn=programs.end_with_parent)
+    lines, jobs = [], {}
     for line in process.stderr:
         line = line.strip()
         lines.append(line)
+        notes.take_job(line, jobs)
         if line and not line.startswith(("carillon:", "warning:")):
             tell(progress=0.5, text=line)
     if process.wait() == 0:
-        return [_in_blender(line, found) for line in lines if "unexplained" in line or line.startswith("warning:")]
+        report = [_in_blender(line, found) for line in lines if "unexplained" in line or line.startswith("warning:")]
+        return report + notes.of_sound(scene, folder, report[0], jobs)
     text = "\n".join(lines)
     refusal = re.search(r"^carillon: ([A-Z_]+): (.*)", text, re.MULTILINE | re.DOTALL)
     reason, message = refusal.groups() if refusal else ("FOLEY_FAILED", text)
@@ -149,5 +167,6 @@ def _foley(server, scene, found, gravity, folder):
         message = f"{what.split(': ')[0]}: {advice}"
     elif reason in ADVICE:
         about = f"{', '.join(named)}: " if named else ""
-        message = about + ADVICE[reason]
+        message = motion.world_is_off(scene) if reason == "NO_MOTION" else ""
+        message = message or about + ADVICE[reason]
     raise Fault(reason, _in_blender(message, found), named)

@@ -101,7 +101,9 @@ class BlenderTest(unittest.TestCase):
     def test_what_fails_has_a_name_and_leaves_the_strip(self):
         for case, reason, body in (("material", "UNKNOWN_MATERIAL", "Bar [1]"), ("time", "TIME_REMAPPED", None),
                                    ("programs", "CARILLON_MISSING", None), ("open", "SURFACE_OPEN", "Bar [1]"),
-                                   ("no material", "NO_MATERIAL", None), ("shape keys", "BODY_DEFORMS", "Bar [1]")):
+                                   ("no material", "NO_MATERIAL", None),
+                                   ("negative scale", "SCALE_NEGATIVE", "Bar [1]"),
+                                   ("shape keys", "BODY_DEFORMS", "Bar [1]")):
             refused = self.found["refused"][case]
             self.assertEqual(refused["result"], ["CANCELLED"], case)
             self.assertTrue(refused["fault"].startswith(reason + ": "), refused)

@@ -134,6 +134,9 @@ def failures(scene, bar):
     bar.carillon.material = ""
     refused["no material"] = bake(scene)
     bar.carillon.material = "structural_steel"
+    bar.scale.x *= -1
+    refused["negative scale"] = bake(scene)
+    bar.scale.x *= -1
     bar.shape_key_add(name="Basis")
     key = bar.shape_key_add(name="Long")
     key.data[0].co.x -= 0.2
