@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
+#include <random>
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/fit/statistics.h"
@@ -17,9 +17,39 @@ constexpr double kRounded = 0.03;
 /// No law is held to be exacter than this.
 constexpr double kExact = 0.01;
 constexpr int kMostRounds = 60;
+/// Steps of the logarithms of a law's figures: the first of a search from a guess, the first of one
+/// that begins near its end, and the last of each.
+constexpr double kFar = 1, kNear = 0.1, kFine = 1e-5, kCoarse = 2e-3;
+constexpr int kLaws = 100;
+/// Part of the variance of decays' errors that they share, as they do in a room.
+constexpr double kShared = 0.2;
+/// Standard error of a law, in nepers for each octave beyond the decays that it rests on.
+constexpr double kPerOctave = 0.2;
+/// Part of the draws whose deviation is taken for the standard error, by this many of which a
+/// normal one is exceeded in the rest: no wild draw decides.
+constexpr double kQuantile = 0.9, kAtQuantile = 1.645;
 
 using Figures = std::vector<double>;  // logarithms
-using MakeLaw = std::function<DampingLaw(const Figures&)>;
+
+/// The figures of a law that are found: two of Rayleigh's, or the loss factors.
+Figures FiguresOf(const DampingLaw& law) {
+  if (law.kind == DampingKind::kRayleigh)
+    return {std::log(law.alpha1_s), std::log(law.alpha2_per_s)};
+  Figures figures;
+  for (const LossFactorPoint& point : law.loss_factor)
+    figures.push_back(std::log(point.loss_factor));
+  return figures;
+}
+
+DampingLaw WithFigures(DampingLaw law, const Figures& figures) {
+  if (law.kind == DampingKind::kRayleigh) {
+    law.alpha1_s = std::exp(figures[0]);
+    law.alpha2_per_s = std::exp(figures[1]);
+  }
+  for (size_t k = 0; k < law.loss_factor.size(); ++k)
+    law.loss_factor[k].loss_factor = std::clamp(std::exp(figures[k]), 1e-9, 1.9);
+  return law;
+}
 
 double WeightOf(const MeasuredDecay& decay) { return 0.1 / (0.1 + decay.relative_error); }
 
@@ -35,17 +65,19 @@ double Loss(const std::vector<MeasuredDecay>& decays, const DampingLaw& law) {
   return loss;
 }
 
-/// Lowers the loss by changing one figure after the other, and all together, by steps that shrink.
-Figures Minimize(const std::vector<MeasuredDecay>& decays, Figures figures, const MakeLaw& make) {
-  double least = Loss(decays, make(figures));
-  double step = 1;
+/// Lowers the loss by changing one figure after the other, and all together, by steps that shrink
+/// from the first to the last.
+DampingLaw Minimize(const std::vector<MeasuredDecay>& decays, const DampingLaw& start,
+                    double step = kFar, double last_step = kFine) {
+  Figures figures = FiguresOf(start);
+  double least = Loss(decays, start);
   const auto tries = [&](const Figures& tried) {
-    const double loss = Loss(decays, make(tried));
+    const double loss = Loss(decays, WithFigures(start, tried));
     if (loss >= least) return false;
     least = loss, figures = tried;
     return true;
   };
-  for (int round = 0; round < 40 * kMostRounds && step > 1e-5; ++round) {
+  for (int round = 0; round < 40 * kMostRounds && step > last_step; ++round) {
     bool better = false;
     for (const double by : {step, -step}) {
       for (size_t i = 0; i < figures.size(); ++i) {
@@ -60,7 +92,7 @@ Figures Minimize(const std::vector<MeasuredDecay>& decays, Figures figures, cons
     }
     if (!better) step /= 2;
   }
-  return figures;
+  return WithFigures(start, figures);
 }
 
 void Judge(const std::vector<MeasuredDecay>& decays, size_t figure_count, DampingLaw& law) {
@@ -107,26 +139,15 @@ std::vector<double> KnotsOf(const std::vector<MeasuredDecay>& decays, size_t cou
 }
 
 DampingLaw FitTable(const std::vector<MeasuredDecay>& decays, size_t points) {
-  const std::vector<double> knots = KnotsOf(decays, points);
-  const MakeLaw make = [&](const Figures& figures) {
-    DampingLaw law{.kind = points == 1 ? DampingKind::kEta : DampingKind::kTable};
-    for (size_t k = 0; k < points; ++k) {
-      law.loss_factor.push_back({knots[k], std::clamp(std::exp(figures[k]), 1e-9, 1.9)});
-    }
-    return law;
-  };
-  const Figures start(points, std::log(MedianLossFactor(decays)));
-  DampingLaw law = make(Minimize(decays, start, make));
+  DampingLaw law{.kind = points == 1 ? DampingKind::kEta : DampingKind::kTable};
+  const double loss_factor = std::clamp(MedianLossFactor(decays), 1e-9, 1.9);
+  for (const double knot : KnotsOf(decays, points)) law.loss_factor.push_back({knot, loss_factor});
+  law = Minimize(decays, law);
   Judge(decays, points, law);
   return law;
 }
 
 DampingLaw FitRayleigh(const std::vector<MeasuredDecay>& decays) {
-  const MakeLaw make = [](const Figures& figures) {
-    return DampingLaw{.kind = DampingKind::kRayleigh,
-                      .alpha1_s = std::exp(figures[0]),
-                      .alpha2_per_s = std::exp(figures[1])};
-  };
   std::vector<double> frequencies;
   frequencies.reserve(decays.size());
   for (const MeasuredDecay& decay : decays) frequencies.push_back(decay.frequency_hz);
@@ -136,13 +157,39 @@ DampingLaw FitRayleigh(const std::vector<MeasuredDecay>& decays) {
   double least = 0;
   // From either term alone and from both halves.
   for (const double part : {0.5, 0.02, 0.98}) {
-    const Figures start = {std::log(part * eta / omega), std::log((1 - part) * eta * omega)};
-    DampingLaw law = make(Minimize(decays, start, make));
+    const DampingLaw law = Minimize(decays, {.kind = DampingKind::kRayleigh,
+                                             .alpha1_s = part * eta / omega,
+                                             .alpha2_per_s = (1 - part) * eta * omega});
     const double loss = Loss(decays, law);
     if (part == 0.5 || loss < least) best = law, least = loss;
   }
   Judge(decays, 2, best);
   return best;
+}
+
+/// Picks one of the laws by Akaike's weights.
+const DampingLaw& Pick(const std::vector<DampingLaw>& laws, std::mt19937& random) {
+  std::vector<double> weights;
+  weights.reserve(laws.size());
+  for (const DampingLaw& law : laws)
+    weights.push_back(std::exp((laws[0].criterion - law.criterion) / 2));
+  return laws[std::discrete_distribution<size_t>(weights.begin(), weights.end())(random)];
+}
+
+/// Draws the decays anew, each moved by its error.
+std::vector<MeasuredDecay> Resampled(const std::vector<MeasuredDecay>& decays,
+                                     std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_int_distribution<size_t> pick(0, decays.size() - 1);
+  const double shared = std::sqrt(kShared) * normal(random);
+  std::vector<MeasuredDecay> drawn;
+  for (size_t k = 0; k < decays.size(); ++k) {
+    MeasuredDecay decay = decays[pick(random)];
+    const double error = shared + std::sqrt(1 - kShared) * normal(random);
+    decay.decay_per_s *= std::exp(error * decay.relative_error);
+    drawn.push_back(decay);
+  }
+  return drawn;
 }
 
 }  // namespace
@@ -173,6 +220,30 @@ std::vector<DampingLaw> FitDamping(const std::vector<MeasuredDecay>& decays, Dam
   }
   std::ranges::sort(laws, {}, &DampingLaw::criterion);
   return laws;
+}
+
+std::vector<double> LawErrors(const std::vector<MeasuredDecay>& decays,
+                              const std::vector<DampingLaw>& laws,
+                              const std::vector<double>& frequencies_hz) {
+  std::mt19937 random(1);
+  std::vector<DampingLaw> drawn;
+  for (int draw = 0; draw < kLaws; ++draw) {
+    const DampingLaw& law = Pick(laws, random);
+    drawn.push_back(Minimize(Resampled(decays, random), law, kNear, kCoarse));
+  }
+  const auto [low, high] = std::ranges::minmax(decays, {}, &MeasuredDecay::frequency_hz);
+  std::vector<double> errors;
+  for (const double hz : frequencies_hz) {
+    std::vector<double> deviations;
+    for (const DampingLaw& law : drawn)
+      deviations.push_back(std::abs(std::log(law.DecayPerS(hz) / laws[0].DecayPerS(hz))));
+    const auto at = deviations.begin() + static_cast<std::ptrdiff_t>(kQuantile * kLaws);
+    std::ranges::nth_element(deviations, at);
+    const double octaves =
+        std::max({0.0, std::log2(low.frequency_hz / hz), std::log2(hz / high.frequency_hz)});
+    errors.push_back(std::hypot(*at / kAtQuantile, kPerOctave * octaves));
+  }
+  return errors;
 }
 
 }  // namespace carillon::fit

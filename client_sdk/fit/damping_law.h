@@ -38,4 +38,12 @@ struct DampingLaw {
 /// for.
 std::vector<DampingLaw> FitDamping(const std::vector<MeasuredDecay>& decays, DampingKind kind);
 
+/// Returns the standard error of ln d of the first of the laws that FitDamping found, at each
+/// frequency. It is that of a bootstrap over the decays, each moved by its error, in which the
+/// other laws are drawn by their Akaike weights (Burnham and Anderson, Model selection and
+/// multimodel inference, 2002), and grows with the distance from the decays.
+std::vector<double> LawErrors(const std::vector<MeasuredDecay>& decays,
+                              const std::vector<DampingLaw>& laws,
+                              const std::vector<double>& frequencies_hz);
+
 }  // namespace carillon::fit

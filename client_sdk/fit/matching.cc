@@ -37,6 +37,9 @@ constexpr double kSoft = 0.002;
 constexpr size_t kMostMatches = 8, kPeaks = 24;
 constexpr double kDistinct = 0.01;
 constexpr int kRounds = 12, kDraws = 200;
+/// Standard error of the estimated errors of a mesh, by which the modes are lowered, relative to
+/// them; it is common to all modes.
+constexpr double kMeshError = 0.15;
 
 /// The lines of one body in the logarithm, for one nu.
 struct LogLines {
@@ -179,9 +182,11 @@ class Matcher {
     double speed = 0, speed_squares = 0, nu = 0, nu_squares = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
       Match moved = match;
+      const double mesh = kMeshError * normal(random);
       for (MatchedLine& line : moved.lines) {
         line = match.lines[pick(random)];
         const MeasuredBody& body = bodies_[line.body];
+        if (!body.lines.errors.empty()) line.deviation += mesh * body.lines.errors[line.mode];
         line.deviation += normal(random) * body.frequency_errors_hz[line.measured] /
                           body.frequencies_hz[line.measured];
       }

@@ -62,7 +62,7 @@ struct Match {
 /// little, predictions that nothing bears out do cost, and lines that are near tell the more. The
 /// greatest values over a grid of c and nu are refined by matching each line to one mode, and least
 /// squares with a soft L1 loss. The errors of the first are those of a bootstrap over the matched
-/// lines, each moved by its error.
+/// lines, each moved by its error, and all by the doubt about the estimated errors of the mesh.
 std::vector<Match> FindMatches(const std::vector<MeasuredBody>& bodies,
                                const MatchSettings& settings);
 

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client_sdk/fit/statistics.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::fit {
@@ -166,6 +168,23 @@ std::vector<MeasuredDecay> DecaysOf(const std::vector<FittedLine>& lines) {
   return decays;
 }
 
+/// Sets the decay rates of the matched lines by the law that was taken, and their errors.
+void ApplyLaw(const std::vector<MeasuredDecay>& decays, MaterialFit& fit) {
+  std::vector<double> frequencies_hz;
+  for (const FittedLine& line : fit.lines) frequencies_hz.push_back(line.measured.frequency_hz);
+  const std::vector<double> errors = LawErrors(decays, fit.laws, frequencies_hz);
+  std::vector<double> matched;
+  for (size_t k = 0; k < fit.lines.size(); ++k) {
+    FittedLine& line = fit.lines[k];
+    if (!line.mode) continue;
+    const double material_per_s = fit.laws[0].DecayPerS(line.measured.frequency_hz);
+    line.law_per_s = material_per_s + line.radiation_per_s;
+    line.law_error_per_s = errors[k] * material_per_s;
+    matched.push_back(errors[k]);
+  }
+  fit.damping_error = Median(std::move(matched));
+}
+
 }  // namespace
 
 absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
@@ -209,11 +228,7 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
   if (known || settings.damping != DampingKind::kAuto) {
     fit.laws = FitDamping(decays, settings.damping);
   }
-  for (FittedLine& line : fit.lines) {
-    if (line.mode && !fit.laws.empty()) {
-      line.law_per_s = fit.laws[0].DecayPerS(line.measured.frequency_hz) + line.radiation_per_s;
-    }
-  }
+  if (!fit.laws.empty()) ApplyLaw(decays, fit);
   return fit;
 }
 

@@ -39,7 +39,8 @@ struct FittedLine {
   std::optional<size_t> mode;  ///< of the model, from 0; absent: no mode matches
   double model_hz = 0;         ///< frequency of that mode with the material
   double radiation_per_s = 0;
-  double law_per_s = 0;  ///< decay rate by the law and radiation
+  double law_per_s = 0;        ///< decay rate by the law and radiation
+  double law_error_per_s = 0;  ///< its standard error
 };
 
 /// A material that was found from recordings.
@@ -56,6 +57,8 @@ struct MaterialFit {
   /// The laws that were tried, the one that was taken first. There is none if the kind of the law
   /// is not given, and a room or noise hides the decays of most matched lines.
   std::vector<DampingLaw> laws;
+  /// Standard error of the law that was taken, relative: the median over the matched lines.
+  double damping_error = 0;
   std::vector<FittedLine> lines;
   size_t matched_count = 0;
   size_t decay_count = 0;                       ///< matched lines whose decay is known

@@ -22,11 +22,12 @@ constexpr int kMostOrder = 18, kMostHeight = 160, kLeastHeight = 10;
 /// is taken whole and by its first half.
 constexpr std::array<double, 3> kStarts_s = {0.006, 0.010, 0.0175};
 constexpr std::array<double, 2> kLengths = {1, 0.5};
-constexpr size_t kRuns = kMostOrder * kStarts_s.size() * kLengths.size();
+constexpr size_t kMostRuns = kMostOrder * kStarts_s.size() * kLengths.size();
 constexpr double kLeastStable = 0.4;
 /// A window ends where the power is within 5 dB of the noise, or 45 dB below its greatest.
 constexpr double kOverNoise = 3.2, kBelowPeak = 3.2e-5;
-constexpr double kLongest_s = 2.5, kShortest_s = 0.03;
+constexpr double kLongest_s = 2.5, kShortest_s = 0.05;
+constexpr double kBlur_s = 0.01;
 /// A band with less power than this over the noise has no modes.
 constexpr double kLeastOverNoise = 10;
 constexpr double kMostDecay_per_s = 700;
@@ -36,6 +37,10 @@ constexpr double kLeastModeOverNoise = 30, kLeastOfBand = 1e-5;
 constexpr double kSwarm = 0.008;
 constexpr double kSharp = 2e-4, kSharpDecay = 0.2;
 constexpr double kHum_per_s = 0.03;
+/// The part of a ring whose noise is compared with that before the blow, and the least fall of the
+/// noise, and number of bands with noise, that count.
+constexpr double kNoiseFrom_s = 0.1, kNoiseTo_s = 0.5, kLeastFall_db = 3;
+constexpr size_t kLeastNoisy = 10;
 /// Decays this near to the room's are hard to tell from it.
 constexpr double kNearRoom = 0.3;
 /// The least relative error of a decay in a room, and that of one as fast as the room's, which
@@ -104,10 +109,11 @@ class Band {
   std::vector<MeasuredMode> Modes() const {
     std::vector<MeasuredMode> modes;
     if (rings_.empty()) return modes;
-    std::vector<Pole> poles = AllPoles();
+    size_t runs = 0;
+    std::vector<Pole> poles = AllPoles(runs);
     while (true) {
       MeasuredMode mode;
-      if (!TakeMostStable(poles, mode)) break;
+      if (!TakeMostStable(poles, runs, mode)) break;
       // Neighbouring bands overlap a little, so that a line between them is in one at least.
       if (std::abs(mode.frequency_hz - centre_hz_) <= kHalfBand_hz + 5) modes.push_back(mode);
     }
@@ -130,15 +136,25 @@ class Band {
 
   double centre_hz() const { return centre_hz_; }
 
+  /// By how much the noise falls at the blow of each ring that has noise before it, dB.
+  const std::vector<double>& noise_falls_db() const { return noise_falls_db_; }
+
  private:
   void Add(size_t ring, const std::vector<std::complex<double>>& all, size_t onset, double rate) {
     const auto index = [&](double seconds) { return static_cast<size_t>(seconds * rate); };
-    if (all.size() < onset + index(kShortest_s)) return;
+    if (all.size() < onset + index(kShortest_s) + index(kBlur_s)) return;
     const Signal signal(all);
     const size_t tail = (all.size() - onset) / 3;
     double noise = MedianNoise(signal.last(std::min(tail, size_t{200})));
-    if (onset > index(0.08))
-      noise = std::min(noise, MedianNoise(signal.subspan(index(0.01), onset - index(0.025))));
+    if (onset > index(0.08)) {
+      const double before = MedianNoise(signal.subspan(index(0.01), onset - index(0.025)));
+      noise = std::min(noise, before);
+      if (before > 0 && all.size() > onset + index(kNoiseTo_s)) {
+        const size_t from = onset + index(kNoiseFrom_s), to = onset + index(kNoiseTo_s);
+        const double after = MedianNoise(signal.subspan(from, to - from));
+        noise_falls_db_.push_back(10 * std::log10(before / (after + 1e-300)));
+      }
+    }
     std::vector<double> power(all.size());
     const size_t half = index(0.005);
     for (size_t i = onset; i < all.size(); ++i) {
@@ -154,9 +170,9 @@ class Band {
     const double least = std::max(kOverNoise * noise, kBelowPeak * *peak);
     auto end = static_cast<size_t>(peak - power.begin());
     while (end < all.size() && power[end] > least && end < onset + index(kLongest_s)) ++end;
-    // The filter blurs the end of the recording, too.
-    end = std::min(end, all.size() - index(0.01));
-    if (end < onset + index(kShortest_s)) return;
+    // Modes that die sooner than the shortest window are seen with the noise after them. The filter
+    // blurs the end of the recording, too.
+    end = std::clamp(end, onset + index(kShortest_s), all.size() - index(kBlur_s));
     rings_.push_back({.ring = ring,
                       .samples = {all.begin() + static_cast<std::ptrdiff_t>(onset),
                                   all.begin() + static_cast<std::ptrdiff_t>(end)},
@@ -196,19 +212,17 @@ class Band {
     return windows;
   }
 
-  std::vector<Pole> AllPoles() const {
+  /// Returns the poles of all runs, and counts the runs: windows of modes that die soon have fewer,
+  /// because they are too short for some starts and orders.
+  std::vector<Pole> AllPoles(size_t& run) const {
     std::vector<Pole> found;
-    size_t run = 0;
     for (const double start : kStarts_s) {
       for (const double length : kLengths) {
         const auto windows = Windows(start, length);
         size_t longest = 0;
         for (const auto& window : windows) longest = std::max(longest, window.size());
         const int height = std::min(kMostHeight, static_cast<int>(longest * 2 / 5));
-        if (height < kLeastHeight) {
-          run += kMostOrder;
-          continue;
-        }
+        if (height < kLeastHeight) continue;
         for (const auto& poles :
              EspritPoles({windows.begin(), windows.end()}, height, kMostOrder)) {
           for (const std::complex<double>& z : poles) AddPole(z, run, found);
@@ -240,8 +254,8 @@ class Band {
   static void ForEachNear(const std::vector<Pole>& poles, size_t at, Use use) {
     const Pole& centre = poles[at];
     const double hz = FrequencyTolerance(centre), per_s = std::max(1.0, 0.3 * centre.decay_per_s);
-    std::array<double, kRuns> distance;
-    std::array<size_t, kRuns> nearest;
+    std::array<double, kMostRuns> distance;
+    std::array<size_t, kMostRuns> nearest;
     distance.fill(1);
     const auto first =
         std::ranges::lower_bound(poles, centre.frequency_hz - hz, {}, &Pole::frequency_hz);
@@ -253,20 +267,22 @@ class Band {
       distance[pole->run] = d;
       nearest[pole->run] = static_cast<size_t>(pole - poles.begin());
     }
-    for (size_t run = 0; run < kRuns; ++run) {
+    for (size_t run = 0; run < kMostRuns; ++run) {
       if (distance[run] < 1) use(nearest[run]);
     }
   }
 
-  /// Takes the poles of the mode that most runs have out of `poles`. Returns whether there is one.
-  static bool TakeMostStable(std::vector<Pole>& poles, MeasuredMode& mode) {
+  /// Takes the poles of the mode that most of the runs have out of `poles`. Returns whether there
+  /// is one.
+  static bool TakeMostStable(std::vector<Pole>& poles, size_t runs, MeasuredMode& mode) {
     size_t best = 0, best_count = 0;
     for (size_t at = 0; at < poles.size(); ++at) {
       size_t count = 0;
       ForEachNear(poles, at, [&](size_t) { ++count; });
       if (count > best_count) best = at, best_count = count;
     }
-    if (static_cast<double>(best_count) < kLeastStable * static_cast<double>(kRuns)) return false;
+    const double least = kLeastStable * static_cast<double>(runs);
+    if (best_count == 0 || static_cast<double>(best_count) < least) return false;
     std::vector<double> frequencies, decays;
     std::vector<size_t> members;
     ForEachNear(poles, best, [&](size_t at) {
@@ -335,6 +351,7 @@ class Band {
   size_t ring_count_;
   bool added_ = false;
   std::vector<BandRing> rings_;
+  std::vector<double> noise_falls_db_;
 };
 
 double Strength(const MeasuredMode& mode) {
@@ -414,6 +431,17 @@ void TellRoomApart(const std::vector<Band>& bands, const Progress& progress,
   }
 }
 
+/// Returns how far the noise falls at the blows in the middle of all bands: a voice or another
+/// sound before a blow is in some of them.
+double GainFallDb(const std::vector<Band>& bands) {
+  std::vector<double> falls_db;
+  for (const Band& band : bands) {
+    falls_db.insert(falls_db.end(), band.noise_falls_db().begin(), band.noise_falls_db().end());
+  }
+  const double fall_db = Median(falls_db);
+  return falls_db.size() < kLeastNoisy || fall_db < kLeastFall_db ? 0 : fall_db;
+}
+
 }  // namespace
 
 ExtractedModes ExtractModes(const std::vector<Ring>& rings, const Progress& progress) {
@@ -435,6 +463,7 @@ ExtractedModes ExtractModes(const std::vector<Ring>& rings, const Progress& prog
     progress(0.6 * std::min(1.0, centre / highest));
   }
   ExtractedModes extracted{.modes = WithoutSwarms(std::move(modes)), .room = {}};
+  extracted.gain_fall_db = GainFallDb(bands);
   TellRoomApart(bands, progress, extracted);
   std::ranges::sort(extracted.modes, {}, &MeasuredMode::frequency_hz);
   double strongest = 0;

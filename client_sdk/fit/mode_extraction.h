@@ -30,6 +30,10 @@ struct MeasuredMode {
 struct ExtractedModes {
   std::vector<MeasuredMode> modes;
   Room room;
+  /// By how much the noise between the lines is quieter after the blows than before them, dB: an
+  /// automatic gain control turned the level down, or a reduction of noise does, and the decays
+  /// are not the body's. Zero where it is not.
+  double gain_fall_db = 0;
 };
 
 /// Is told how much is done, 0 to 1.

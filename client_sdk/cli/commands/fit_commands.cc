@@ -129,6 +129,62 @@ std::string SizeCaution(const FitOptions& options) {
              : "one percent in size is two in E";
 }
 
+/// The named material nearest to the one that was found.
+struct Nearest {
+  std::string name;
+  double young_ratio = 1, density_ratio = 1;  ///< of the found one over that of the named one
+};
+
+Nearest NearestOf(const fit::MaterialFit& fit) {
+  Nearest nearest;
+  double least = HUGE_VAL;
+  for (const v1::CatalogueMaterial& named : Materials().materials()) {
+    const double young = fit.young_pa / named.material().young_pa();
+    const double density = fit.density_kg_per_m3 / named.material().density_kg_per_m3();
+    const double distance = std::hypot(std::log(young), std::log(density));
+    if (distance >= least) continue;
+    least = distance;
+    nearest = {.name = named.name(), .young_ratio = young, .density_ratio = density};
+  }
+  return nearest;
+}
+
+/// Says so if the material is unlike all named ones, which a wrong size or sample rate makes it.
+std::string FarCaution(const Nearest& nearest) {
+  constexpr double kFar = 0.12;
+  const double speed_squared = nearest.young_ratio / nearest.density_ratio;
+  const double farthest =
+      std::max(std::abs(std::log(speed_squared)), std::abs(std::log(nearest.density_ratio)));
+  if (farthest < kFar) return "";
+  return absl::StrFormat(
+      "No named material is near: the nearest, %s, has %.2f times the E/rho and %.2f times the "
+      "density. If the body is of a usual material, see its size, the unit of its mesh and its "
+      "mass, and that the recordings state their true sample rate: 44100 in place of 48000 Hz "
+      "makes "
+      "E/rho 16 %% too small, the reverse 18 %% too great.",
+      nearest.name, 1 / speed_squared, 1 / nearest.density_ratio);
+}
+
+/// Says so if the level of the recordings was changed while they were made.
+std::string GainCaution(const Extracted& extracted) {
+  if (extracted.gain_fall_db == 0) return "";
+  return absl::StrFormat(
+      "The noise is %.0f dB quieter after the blows than before them. Unless another sound ended "
+      "there, an automatic gain control changed the level, and the decays are not the body's: "
+      "switch "
+      "it off, and record again. The frequencies do not suffer.",
+      extracted.gain_fall_db);
+}
+
+/// What to be cautious about, one sentence or more in each.
+std::vector<std::string> CautionsOf(const fit::MaterialFit& fit,
+                                    const std::vector<Source>& sources) {
+  std::vector<std::string> cautions = {FarCaution(NearestOf(fit))};
+  for (const Source& source : sources) cautions.push_back(GainCaution(source.extracted));
+  std::erase(cautions, "");
+  return cautions;
+}
+
 std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Source>& sources,
                              const FitOptions& options) {
   std::string text = "# A material that carillon material fit found.\n";
@@ -152,16 +208,18 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
         fit.decay_count);
   } else {
     absl::StrAppendFormat(&text,
-                          "# Damping: %s, within a factor of %.2f of half of the decay rates, "
-                          "known from %.0f to %.0f Hz.\n",
-                          fit.laws[0].Name(), fit.laws[0].missed_by, fit.decays_from_hz,
-                          fit.decays_to_hz);
+                          "# Damping: %s, +- %.2g %% (two standard errors), within a factor of "
+                          "%.2f of half of the decay rates, known from %.0f to %.0f Hz.\n",
+                          fit.laws[0].Name(), 200 * fit.damping_error, fit.laws[0].missed_by,
+                          fit.decays_from_hz, fit.decays_to_hz);
   }
   for (const Source& source : sources) {
     if (fit.laws.empty() || source.no_air.empty()) continue;
     absl::StrAppend(&text, "# The damping includes what ", source.body.name,
                     " radiates: ", source.no_air, ".\n");
   }
+  for (const std::string& caution : CautionsOf(fit, sources))
+    absl::StrAppend(&text, "# ", caution, "\n");
   return absl::StrCat(text, MaterialOf(fit).DebugString());
 }
 
@@ -189,6 +247,7 @@ Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
   json["model_hz"] = line.model_hz;
   json["radiation_per_s"] = line.radiation_per_s;
   json["law_per_s"] = line.law_per_s;
+  json["law_error_per_s"] = line.law_error_per_s;
   return json;
 }
 
@@ -253,6 +312,9 @@ Json ToJson(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
           {"decays_from_hz", fit.decays_from_hz},
           {"decays_to_hz", fit.decays_to_hz},
           {"laws", laws},
+          {"damping_error", fit.damping_error},
+          {"nearest_material", NearestOf(fit).name},
+          {"cautions", CautionsOf(fit, sources)},
           {"lines", lines},
           {"bodies", bodies},
           {"candidates", candidates}};
@@ -285,15 +347,16 @@ void PrintModes(const std::vector<fit::MeasuredMode>& modes) {
 }
 
 void PrintLines(const fit::MaterialFit& fit, const std::vector<Source>& sources) {
-  absl::PrintF("\n%-12s %12s %11s %9s %5s %12s %8s %11s\n", "body", "measured Hz", "decay 1/s",
-               "+- 1/s", "mode", "model Hz", "apart %", "model 1/s");
+  absl::PrintF("\n%-12s %12s %11s %9s %5s %12s %8s %11s %9s\n", "body", "measured Hz", "decay 1/s",
+               "+- 1/s", "mode", "model Hz", "apart %", "model 1/s", "+- 1/s");
   for (const fit::FittedLine& line : fit.lines) {
     absl::PrintF("%-12s %12.3f %11.3f %9.3f", sources[line.body].body.name,
                  line.measured.frequency_hz, line.measured.decay_per_s,
                  line.measured.decay_error_per_s);
     if (line.mode) {
-      absl::PrintF(" %5d %12.3f %8.2f %11.3f", *line.mode + 1, line.model_hz,
-                   100 * std::log(line.measured.frequency_hz / line.model_hz), line.law_per_s);
+      absl::PrintF(" %5d %12.3f %8.2f %11.3f %9.3f", *line.mode + 1, line.model_hz,
+                   100 * std::log(line.measured.frequency_hz / line.model_hz), line.law_per_s,
+                   line.law_error_per_s);
     }
     absl::PrintF("%s\n", line.measured.near_room ? " *" : "");
   }
@@ -307,6 +370,9 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
                fit.young_over_density, 200 * fit.young_over_density_error);
   absl::PrintF("E           %.5g GPa at %.5g kg/m^3\n", fit.young_pa / 1e9, fit.density_kg_per_m3);
   absl::PrintF("Poisson     %.4f +- %.4f\n", fit.poisson_ratio, 2 * fit.poisson_error);
+  const Nearest nearest = NearestOf(fit);
+  absl::PrintF("nearest     %s: E %+.2g %%, density %+.2g %%\n", nearest.name,
+               100 * (nearest.young_ratio - 1), 100 * (nearest.density_ratio - 1));
   for (size_t b = 0; sources.size() > 1 && b < sources.size(); ++b) {
     const Agreement agreement = AgreementOf(fit, b);
     absl::PrintF("%-11s %d of %s matched, %.2g %% apart, %+.2g %% on the average\n",
@@ -334,8 +400,10 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
   }
   if (!fit.laws.empty()) {
     absl::PrintF(
-        "            by the decays of %s, known from %.0f to %.0f Hz; beyond, it is a guess\n",
-        Counted(fit.decay_count, "line"), fit.decays_from_hz, fit.decays_to_hz);
+        "            +- %.2g %% (two standard errors) by the decays of %s, known from %.0f to %.0f "
+        "Hz; beyond, it is a guess\n",
+        200 * fit.damping_error, Counted(fit.decay_count, "line"), fit.decays_from_hz,
+        fit.decays_to_hz);
   }
   for (const Source& source : sources) {
     if (!fit.laws.empty() && !source.no_air.empty()) {
@@ -347,6 +415,7 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
   PrintLines(fit, sources);
   absl::PrintF("\nA wrong size of the mesh hides in E and cannot be seen: %s.\n",
                SizeCaution(options));
+  for (const std::string& caution : CautionsOf(fit, sources)) absl::PrintF("%s\n", caution);
 }
 
 /// Writes what the matched modes leave of the first strike, and returns its shares of the energy.
@@ -382,11 +451,14 @@ absl::Status ExtractModesOf(const ExtractOptions& options, bool json) {
     for (const fit::MeasuredMode& mode : extracted.modes) modes.push_back(ToJson(mode));
     absl::PrintF("%s\n", Json{{"strikes", extracted.rings.size()},
                               {"room_t60_s", RoomT60(extracted.room)},
+                              {"gain_fall_db", extracted.gain_fall_db},
                               {"modes", modes}}
                              .dump());
   } else {
     PrintModes(extracted.modes);
     PrintRoom(extracted.room);
+    const std::string caution = GainCaution(extracted);
+    if (!caution.empty()) absl::PrintF("%s\n", caution);
   }
   return absl::OkStatus();
 }

@@ -68,6 +68,7 @@ absl::StatusOr<Extracted> ExtractFrom(const std::vector<std::string>& paths) {
   });
   extracted.modes = std::move(found.modes);
   extracted.room = found.room;
+  extracted.gain_fall_db = found.gain_fall_db;
   if (shows) absl::FPrintF(stderr, "\r\033[K");
   return extracted;
 }

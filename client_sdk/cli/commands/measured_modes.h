@@ -17,6 +17,7 @@ struct Extracted {
   std::vector<fit::Ring> rings;
   std::vector<fit::MeasuredMode> modes;
   fit::Room room;
+  double gain_fall_db = 0;
 };
 
 /// Reads recordings and finds the modes. Shows the progress on a terminal. Errors: those of

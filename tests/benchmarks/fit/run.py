@@ -3,7 +3,8 @@
 """How well `carillon material fit` finds materials: sounds of bodies whose material is known, the recorded steel bar,
 a block whose resonances are published, and recordings held against the mesh of another body.
 
-    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--draw N] [--parts table,wrong,bar,block]
+    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--draws 0,1,...]
+           [--parts table,wrong,bar,block]
 
 Prints Markdown tables. A sound is the closed form of a struck body whose frequencies are jittered by 0.15 %, which
 stands for what a mesh misses, decomposed at another Poisson's ratio than that of the model.
@@ -30,6 +31,7 @@ ROWS = {f"{name}{noise}{'room' * room}": (span, noise, room)
         for name, span in (("hard", HARD_S), ("soft", SOFT_S))
         for noise, room in ((60, False), (40, False), (20, False), (40, True))}
 STRIKES, JITTER = 2, 0.0015
+MOST_ERROR = 0.45  # relative, of decays that the fit takes for known
 ROOM_T60_S, ROOM_LEVEL_DB = (0.25, 0.7), (-12, -6)
 # The bar of ../../../../shared/recordings: its size and its mass.
 BAR_SIZE_M, BAR_MASS_KG, BAR_YOUNG_PA = (0.11436, 0.02544, 0.00312), 0.0713, 214.6e9
@@ -54,6 +56,8 @@ class Outcome:
     matched: int = 0
     log_odds: float = 0.0
     cpu_s: float = 0.0
+    # Deviations from the truth over two standard errors: of E/rho, of nu, of each decay, of each rate by the law.
+    bars: tuple = ((),) * 4
 
 
 class Studio:
@@ -124,9 +128,21 @@ def judge(truth, answer, refusal, cpu_s):
     if answer["laws"]:
         ratio = numpy.abs(numpy.log(law_decays(answer["laws"][0], hz) / truth.decays(hz)))
         damping = math.exp(float(numpy.median(ratio))) - 1
-    return Outcome(young_error=answer["young_over_density"] / truth.young_over_density - 1,
-                   nu_error=answer["poisson_ratio"] - truth.nu, damping_error=damping, matched=answer["matched"],
-                   log_odds=answer["log_odds"], cpu_s=cpu_s)
+    young_error = answer["young_over_density"] / truth.young_over_density - 1
+    nu_error = answer["poisson_ratio"] - truth.nu
+    bars = ([young_error / answer["young_over_density_error"]], [nu_error / max(1e-9, answer["poisson_error"])],
+            *(deviations(truth, answer, name) for name in ("decay", "law")))
+    return Outcome(young_error=young_error, nu_error=nu_error, damping_error=damping, matched=answer["matched"],
+                   log_odds=answer["log_odds"], cpu_s=cpu_s, bars=tuple(numpy.abs(bar) / 2 for bar in bars))
+
+
+def deviations(truth, answer, name):
+    """Those of the rates of matched lines, "decay" or "law", over their standard errors, as far as they are stated to
+    be known."""
+    lines = [(line[f"{name}_per_s"], line[f"{name}_error_per_s"], line["frequency_hz"]) for line in answer["lines"]
+             if "mode" in line]
+    return numpy.array([(rate - float(truth.decays(hz))) / error for rate, error, hz in lines
+                        if 0 < error < MOST_ERROR * rate])
 
 
 def cases():
@@ -203,13 +219,30 @@ def print_row(name, outcomes, damping=True):
           f", {median(o.matched for o in answers):.0f} | {median(o.cpu_s for o in outcomes):.1f} |", flush=True)
 
 
-def show_table(studio, rows, draw):
+def print_bars(rows):
+    """How many truths lie within two stated standard errors."""
+    print("\n| strikes | E/rho | nu | decays | rates by the law | of them in laws over 10 % off |")
+    print("| --- | --- | --- | --- | --- | --- |")
+
+    def count(outcomes, bar):
+        ratios = numpy.concatenate([outcome.bars[bar] for outcome in outcomes] or [[]])
+        return f"{numpy.sum(ratios < 1)} of {len(ratios)}"
+
+    for name, outcomes in (*rows.items(), ("all", sum(rows.values(), []))):
+        off = [outcome for outcome in outcomes if (outcome.damping_error or 0) > 0.1]
+        print(f"| {name} | {' | '.join(count(outcomes, bar) for bar in range(4))} | {count(off, 3)} |", flush=True)
+
+
+def show_table(studio, rows, draws):
     print("| strikes | cases | refused | E/rho < 0.5 % (six lines) | nu < 0.02 (six lines) | damping < 10 % "
           "| E/rho < 1 % | median E/rho, nu, damping, lines | CPU s |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    outcomes = {}
     for row in rows:
-        print_row(row, run_row(studio, row, draw))
+        outcomes[row] = [outcome for draw in draws for outcome in run_row(studio, row, draw)]
+        print_row(row, outcomes[row])
     print_row("lines missing and false", run_lines(studio), damping=False)
+    print_bars(outcomes)
 
 
 def show_wrong(studio):
@@ -267,7 +300,7 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, required=True)
     parser.add_argument("--recordings", type=pathlib.Path, default=HERE.parents[3] / "shared/recordings")
     parser.add_argument("--rows", default=",".join(ROWS))
-    parser.add_argument("--draw", type=int, default=0, help="another number draws other strikes and rooms")
+    parser.add_argument("--draws", default="0", help="numbers, each of which draws other strikes and rooms")
     parser.add_argument("--parts", default="table,wrong,bar,block")
     options = parser.parse_args()
     build = options.build.resolve()
@@ -279,7 +312,7 @@ def main():
         studio = Studio(build, pathlib.Path(folder))
         try:
             if "table" in options.parts:
-                show_table(studio, options.rows.split(","), options.draw)
+                show_table(studio, options.rows.split(","), [int(draw) for draw in options.draws.split(",")])
             if "wrong" in options.parts:
                 show_wrong(studio)
             if "bar" in options.parts:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <random>
 
 namespace carillon::fit {
 namespace {
@@ -61,6 +62,48 @@ TEST(FitDamping, ATableFollowsALossThatRises) {
     for (const double hz : {400.0, 2000.0, 9000.0})
       EXPECT_NEAR(laws[0].DecayPerS(hz) / law(hz), 1, 0.05);
   }
+}
+
+TEST(LawErrors, HoldTheTruthInNineOfTenCases) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  const auto rayleigh = [](double hz) { return 2e-7 * hz * hz + 1; };
+  const auto eta = [](double hz) { return std::numbers::pi * hz * 1e-3; };
+  int held = 0, all = 0;
+  double sum = 0;
+  for (int draw = 0; draw < 40; ++draw) {
+    const std::function<double(double)> law = draw % 2 == 0 ? rayleigh : std::function(eta);
+    std::vector<MeasuredDecay> decays;
+    std::vector<double> frequencies_hz;
+    for (int m = 0; m < 8; ++m) {
+      const double hz = 400 * std::pow(1.5, m), error = m % 2 == 0 ? 0.02 : 0.1;
+      frequencies_hz.push_back(hz);
+      decays.push_back({.frequency_hz = hz,
+                        .decay_per_s = law(hz) * std::exp(error * normal(random)),
+                        .relative_error = error});
+    }
+    const auto laws = FitDamping(decays, DampingKind::kAuto);
+    const auto errors = LawErrors(decays, laws, frequencies_hz);
+    for (size_t m = 0; m < errors.size(); ++m) {
+      const double hz = frequencies_hz[m];
+      held += std::abs(std::log(laws[0].DecayPerS(hz) / law(hz))) < 2 * errors[m] ? 1 : 0;
+      sum += errors[m];
+      ++all;
+    }
+  }
+  EXPECT_GE(held, 0.9 * all);
+  EXPECT_LT(sum / all, 0.1) << "no more than the worse of the decays' errors";
+}
+
+TEST(LawErrors, GrowBeyondTheDecaysAndWithWhatIsSaidOfThem) {
+  const auto law = [](double hz) { return std::numbers::pi * hz * 1e-3; };
+  std::vector<MeasuredDecay> decays = Decays(law);
+  const auto laws = FitDamping(decays, DampingKind::kEta);
+  const auto errors = LawErrors(decays, laws, {3000, 3000 * 16});
+  EXPECT_LT(errors[0], 0.05);
+  EXPECT_GT(errors[1], 0.15) << "an octave and more above the last decay";
+  for (MeasuredDecay& decay : decays) decay.relative_error = 0.2;
+  EXPECT_GT(LawErrors(decays, laws, {3000})[0], 2 * errors[0]);
 }
 
 }  // namespace

@@ -43,6 +43,11 @@ TEST(FitMaterial, FindsTheMaterialWithTheMassOfTheBody) {
   EXPECT_EQ(fit->matched_count, 12U);
   ASSERT_FALSE(fit->laws.empty());
   EXPECT_NEAR(fit->laws[0].DecayPerS(2000), std::numbers::pi * 2000 * kLossFactor, 0.1);
+  EXPECT_GT(fit->damping_error, 0);
+  EXPECT_LT(fit->damping_error, 0.1);
+  for (const FittedLine& line : fit->lines) {
+    EXPECT_LT(std::abs(line.law_per_s - line.measured.decay_per_s), 2 * line.law_error_per_s);
+  }
 }
 
 TEST(FitMaterial, AQuietLineDoesNotBendTheLawOfDamping) {

@@ -36,6 +36,19 @@ TEST(ExtractModes, FindsTheLinesOfASoundAndNoOthers) {
   }
 }
 
+TEST(ExtractModes, FindsStrongLinesThatDieWithinSomeHundredthsOfASecond) {
+  // Alone, as a pair, beside a line that rings on, and where the noise hides all but 40 ms.
+  const std::vector<TrueMode> truth = {{5210, 90, 0.2},  {9030, 160, 0.3},  {12868, 110, 0.3},
+                                       {12990, 90, 0.2}, {15620, 25, 0.05}, {15700, 140, 0.3},
+                                       {18210, 200, 0.4}};
+  const ExtractedModes found = Extract(Struck(truth, 3e-3));
+  ASSERT_EQ(found.modes.size(), truth.size());
+  for (size_t m = 0; m < truth.size(); ++m) {
+    EXPECT_NEAR(found.modes[m].frequency_hz, truth[m].frequency_hz, 0.02 * truth[m].decay_per_s);
+    EXPECT_NEAR(found.modes[m].decay_per_s, truth[m].decay_per_s, 0.15 * truth[m].decay_per_s);
+  }
+}
+
 TEST(ExtractModes, PartsADoubletThreeHertzApart) {
   const ExtractedModes found = Extract(Struck({{1681.2, 3, 0.3}, {1684.2, 4, 0.25}}, 1e-4));
   ASSERT_EQ(found.modes.size(), 2U);
@@ -67,6 +80,18 @@ TEST(ExtractModes, TellsADecayFromThatOfTheRoom) {
   deviation /= known;
   EXPECT_NEAR(deviation, 0, 0.08)
       << "on average; without the room it is some -0.2 of those above 20";
+}
+
+TEST(ExtractModes, TellsOfAGainThatWasTurnedDownAtTheBlow) {
+  const Recording steady = Struck({{700, 4, 0.2}, {2900, 9, 0.2}, {7010, 20, 0.2}}, 1e-3);
+  EXPECT_EQ(Extract(steady).gain_fall_db, 0);
+  Recording turned = steady;
+  const auto onset = static_cast<size_t>(0.3 * kSampleRate_hz);
+  for (size_t n = onset; n < turned.channels[0].size(); ++n) {
+    const double t = static_cast<double>(n - onset) / kSampleRate_hz;
+    turned.channels[0][n] *= static_cast<float>(std::pow(10, (-12 + 6 * t) / 20));
+  }
+  EXPECT_NEAR(Extract(turned).gain_fall_db, 10, 2) << "12 dB, of which some return meanwhile";
 }
 
 TEST(FindRings, PartsTheStrikesOfOneFile) {

@@ -47,11 +47,25 @@ class Material(DaemonTest):
         self.assertAlmostEqual(self.found.material.young_pa / self.found.young_pa, 1, delta=1e-5)
         rates = [line.law_per_s / (LOSS * numpy.pi * line.frequency_hz) for line in self.found.lines if line.mode]
         self.assertLess(abs(numpy.median(rates) - 1), 0.1)
+        self.assertTrue(0 < self.found.damping_error < 0.2, self.found.damping_error)
+        self.assertIn("(two standard errors)", self.found.text)
         # From 20 to 100 ms there is nothing but the modes, of which those that no line was found for are the rest.
         late = [share for begin, end, share in self.found.residual_shares if begin == 0.02]
         self.assertLess(late[0], 0.05)
         self.assertGreater(self.found.residual.seconds, 1)
         self.assertEqual(carillon.fit.extract(self.taps, program=self.own["program"]).strike_count, len(PLACES))
+
+    def test_a_wrong_sample_rate_is_cautioned_against(self):
+        self.assertEqual((self.found.nearest_material, self.found.cautions), ("soda_lime_glass", []))
+        taps = [self.folder / f"slow{number}.wav" for number in range(len(self.taps))]
+        for tap, slow in zip(self.taps, taps):
+            sound = carillon.Sound.load(tap)
+            carillon.Sound(sound.samples, round(sound.sample_rate_hz / 1.088)).save(slow)
+        found = carillon.fit.material("plate", taps, density=DENSITY, **self.own)
+        self.assertAlmostEqual(found.young_pa / self.found.young_pa, 1.088**-2, delta=0.005)
+        self.assertEqual(len(found.cautions), 1)
+        self.assertIn("sample rate", found.cautions[0])
+        self.assertIn(found.cautions[0], found.text)
 
     def test_an_object_of_a_poisson_ratio_nearby_sounds_as_if_it_were_decomposed_for_it(self):
         mesh = self.folder / "thin.obj"

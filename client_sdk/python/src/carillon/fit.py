@@ -45,21 +45,26 @@ class Line:
     model_hz: float = 0
     radiation_per_s: float = 0
     law_per_s: float = 0
+    law_error_per_s: float = 0
 
 
 @dataclasses.dataclass(frozen=True)
 class Extraction:
-    """The lines of recorded strikes. `room_t60_s` is None where no room was told apart."""
+    """The lines of recorded strikes. `room_t60_s` is None where no room was told apart. `gain_fall_db` is by how much an
+    automatic gain control turned the level down at the blows, as the noise tells, or zero; it changes the decays."""
 
     lines: list[Line]
     strike_count: int
     room_t60_s: Optional[float]
+    gain_fall_db: float = 0
 
 
 @dataclasses.dataclass(frozen=True)
 class Fit:
-    """A material, and how it explains the recordings. Errors are standard errors, that of E/rho is relative. `text` is
-    the material as a file that `carillon ... --material-file` reads. `laws` are the laws of damping, the chosen one
+    """A material, and how it explains the recordings. Errors are standard errors, those of E/rho and of the damping are
+    relative, the latter the median over the matched lines. `text` is the material as a file that `carillon ...
+    --material-file` reads. `nearest_material` is the named material nearest to it, and `cautions` say what to check, for
+    example if none is near. `laws` are the laws of damping, the chosen one
     first, as `carillon --json material fit` prints them, and empty where a room or noise hides most decays. `modes_hz`
     has the frequencies of all modes of each body with that material. `residual` is what the matched modes leave of the
     first strike, and `residual_shares` its share of the energy from one second to another."""
@@ -77,6 +82,9 @@ class Fit:
     log_odds: float
     lines: list[Line]
     laws: list[dict[str, Any]]
+    damping_error: float
+    nearest_material: str
+    cautions: list[str]
     modes_hz: dict[str, list[float]]
     residual: Optional[Sound]
     residual_shares: list[tuple[float, float, float]]
@@ -94,7 +102,8 @@ def extract(recordings: Iterable[Path], *, program: str = "carillon") -> Extract
     """Lists the frequencies and the decays of recorded strikes on one body. Raises CarillonError, with the reasons of
     proto/errors.md, such as TOO_FEW_MODES."""
     found = json.loads(programs.run(program, None, "--json", "material", "extract", *recordings).stdout)
-    return Extraction([Line(**mode) for mode in found["modes"]], found["strikes"], found["room_t60_s"])
+    return Extraction([Line(**mode) for mode in found["modes"]], found["strikes"], found["room_t60_s"],
+                      found["gain_fall_db"])
 
 
 def material(model: Body, recordings: Iterable[Path], *, mass: Optional[float] = None,
