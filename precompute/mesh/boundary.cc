@@ -5,9 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
-#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 
@@ -46,30 +46,63 @@ Corners CornersOf(const BoundaryFace& face) {
   return {face.nodes[0], face.nodes[1], face.nodes[2]};
 }
 
+/// Returns the sorted corners of all faces, four for each element.
+std::vector<Corners> FacesOf(const TetMesh& mesh) {
+  std::vector<Corners> faces;
+  faces.reserve(4 * mesh.element_count());
+  const auto stride = static_cast<size_t>(mesh.nodes_per_element);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const int32_t* const element = &mesh.elements[e * stride];
+    for (const auto& [a, b, c] : kTetFaces) {
+      faces.push_back(Sorted({element[a], element[b], element[c]}));
+    }
+  }
+  return faces;
+}
+
+/// Returns how many elements have each of the faces. The faces of each smallest node are sorted by
+/// themselves, because few faces share it.
+std::vector<uint32_t> CountUses(const std::vector<Corners>& faces, size_t node_count) {
+  std::vector<size_t> begin(node_count + 1);
+  for (const Corners& face : faces) ++begin[static_cast<size_t>(face[0]) + 1];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<size_t> next = begin;
+  std::vector<uint32_t> order(faces.size());
+  for (size_t f = 0; f < faces.size(); ++f) {
+    order[next[static_cast<size_t>(faces[f][0])]++] = static_cast<uint32_t>(f);
+  }
+  std::vector<uint32_t> uses(faces.size());
+  for (size_t node = 0; node < node_count; ++node) {
+    const auto end = order.begin() + static_cast<ptrdiff_t>(begin[node + 1]);
+    auto first = order.begin() + static_cast<ptrdiff_t>(begin[node]);
+    std::sort(first, end, [&](uint32_t f, uint32_t g) { return faces[f] < faces[g]; });
+    while (first != end) {
+      const auto last =
+          std::find_if(first, end, [&](uint32_t f) { return faces[f] != faces[*first]; });
+      std::for_each(first, last,
+                    [&](uint32_t f) { uses[f] = static_cast<uint32_t>(last - first); });
+      first = last;
+    }
+  }
+  return uses;
+}
+
 }  // namespace
 
 absl::Status FindBoundary(TetMesh& mesh) {
-  absl::flat_hash_map<Corners, int> use_count;
-  use_count.reserve(mesh.element_count() * 2);
-  for (size_t e = 0; e < mesh.element_count(); ++e) {
-    for (const auto& corner : kTetFaces) {
-      const Corners corners = CornersOf(FaceOf(mesh, e, corner));
-      if (++use_count[Sorted(corners)] > 2) {
-        return Refusal(
-            absl::StatusCode::kInvalidArgument, "MESH_NOT_MANIFOLD",
-            absl::StrCat("more than two tetrahedra share the face of nodes ", corners[0], ", ",
-                         corners[1], ", ", corners[2], ": remove tetrahedra that are there twice"));
-      }
-    }
-  }
+  const std::vector<Corners> faces = FacesOf(mesh);
+  const std::vector<uint32_t> uses = CountUses(faces, mesh.nodes.size());
   mesh.boundary.clear();
-  for (size_t e = 0; e < mesh.element_count(); ++e) {
-    for (const auto& corner : kTetFaces) {
-      BoundaryFace face = FaceOf(mesh, e, corner);
-      if (use_count[Sorted(CornersOf(face))] != 1) continue;
-      face.given_triangle = static_cast<int32_t>(mesh.boundary.size());
-      mesh.boundary.push_back(face);
+  for (size_t f = 0; f < faces.size(); ++f) {
+    if (uses[f] > 2) {
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "MESH_NOT_MANIFOLD",
+          absl::StrCat("more than two tetrahedra share the face of nodes ", faces[f][0], ", ",
+                       faces[f][1], ", ", faces[f][2], ": remove tetrahedra that are there twice"));
     }
+    if (uses[f] != 1) continue;
+    mesh.boundary.push_back(FaceOf(mesh, f / 4, kTetFaces[f % 4]));
+    mesh.boundary.back().given_triangle = static_cast<int32_t>(mesh.boundary.size()) - 1;
   }
   return absl::OkStatus();
 }

@@ -201,8 +201,11 @@ bool IsFlat(const std::vector<Point>& nodes, const int32_t* corners) {
 /// plane except for rounding in single precision, and they would add nodes almost without
 /// stiffness. The other two faces of the tetrahedron become boundary faces.
 void PeelFlatTetrahedra(TetMesh& mesh, GivenTriangles& given) {
-  absl::flat_hash_map<Corners, int> use_count;
   const size_t count = mesh.elements.size() / 4;
+  std::vector<bool> flat(count);
+  for (size_t e = 0; e < count; ++e) flat[e] = IsFlat(mesh.nodes, &mesh.elements[4 * e]);
+  if (std::ranges::find(flat, true) == flat.end()) return;
+  absl::flat_hash_map<Corners, int> use_count;
   for (size_t e = 0; e < count; ++e) {
     for (const Corners& face : FacesOf(&mesh.elements[4 * e])) ++use_count[face];
   }
@@ -210,7 +213,7 @@ void PeelFlatTetrahedra(TetMesh& mesh, GivenTriangles& given) {
   for (bool again = true; again;) {
     again = false;
     for (size_t e = 0; e < count; ++e) {
-      if (gone[e] || !IsFlat(mesh.nodes, &mesh.elements[4 * e])) continue;
+      if (gone[e] || !flat[e]) continue;
       const std::array<Corners, 4> faces = FacesOf(&mesh.elements[4 * e]);
       const auto outer = [&](const Corners& face) { return use_count[face] == 1; };
       if (std::ranges::count_if(faces, outer) != 2) continue;

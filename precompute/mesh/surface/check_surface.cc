@@ -76,26 +76,38 @@ absl::Status CheckFinite(const SurfaceMesh& surface) {
   return absl::OkStatus();
 }
 
+/// Whether an odd number of exchanges sorts the corners. Of two triangles with the same corners,
+/// one of which is odd, the normals point against each other.
+bool IsOdd(const Corners& c) { return ((c[0] > c[1]) != (c[1] > c[2])) != (c[0] > c[2]); }
+
+/// Two triangles with the same corners: a wall that two closed shells share, or a shell that is
+/// there twice.
 absl::Status CheckDuplicates(const SurfaceMesh& surface) {
   absl::flat_hash_map<Corners, size_t> triangle_of_corners;
   triangle_of_corners.reserve(surface.triangles.size());
-  size_t duplicate_count = 0;
+  size_t duplicate_count = 0, opposite_count = 0;
   std::pair<size_t, size_t> first;
   for (size_t t = 0; t < surface.triangles.size(); ++t) {
     Corners corners = surface.triangles[t];
     if (IsCollapsed(corners)) continue;
     std::ranges::sort(corners);
     const auto [found, is_new] = triangle_of_corners.try_emplace(corners, t);
-    if (!is_new && duplicate_count++ == 0) first = {found->second, t};
+    if (is_new) continue;
+    if (duplicate_count++ == 0) first = {found->second, t};
+    if (IsOdd(surface.triangles[found->second]) != IsOdd(surface.triangles[t])) ++opposite_count;
   }
   if (duplicate_count == 0) return absl::OkStatus();
-  return Refuse("MESH_DUPLICATE_SHELL",
-                absl::StrCat(duplicate_count,
-                             " triangles lie on another with the same corners, "
-                             "first triangles ",
-                             first.first, " and ", first.second, " at ",
-                             Show(VertexAt(surface, surface.triangles[first.first][0])),
-                             ": keep one shell of those that are there twice"));
+  const bool touch =
+      opposite_count == duplicate_count && 2 * duplicate_count < surface.triangles.size();
+  return Refuse(
+      "MESH_DUPLICATE_SHELL",
+      absl::StrCat(duplicate_count,
+                   " triangles lie on another with the same corners, first triangles ", first.first,
+                   " and ", first.second, " at ",
+                   Show(VertexAt(surface, surface.triangles[first.first][0])),
+                   touch ? ", because closed shells touch there: unite the shells, or make each an "
+                           "object, material or solid of its own, from which one body is made"
+                         : ": keep one shell of those that are there twice"));
 }
 
 /// Number of triangles that use an edge from its smaller to its larger vertex, and in the opposite

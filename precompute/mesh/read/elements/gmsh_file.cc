@@ -91,7 +91,8 @@ class GmshParser {
     const auto words = lines_.NextWords();
     if (words.size() != 3) return lines_.Unreadable("no mesh format of Gmsh");
     is_41_ = words[0] == "4.1";
-    if (!is_41_ && !words[0].starts_with("2.")) {
+    // Gmsh 2.0 wrote "2".
+    if (!is_41_ && words[0] != "2" && !words[0].starts_with("2.")) {
       return Unreadable(absl::StrCat("its version is ", QuotedText(words[0])));
     }
     if (words[2] != "8") return Unreadable("its numbers have not eight bytes");

@@ -100,6 +100,15 @@ TEST_F(ReadGmshTest, PassesOverNodesThatNoTetrahedronHas) {
   ExpectSame(ReadTetsOf(ToTextGmsh(padded)), box);
 }
 
+TEST_F(ReadGmshTest, TheVersionsTwoDifferInNothingThatIsRead) {
+  const TetMesh box = Box(4);
+  for (const char* version : {"2", "2.1"}) {
+    std::string text = ToTextGmsh(box);
+    text.replace(text.find("2.2 "), 3, version);
+    ExpectSame(ReadTetsOf(text), box);
+  }
+}
+
 TEST_F(ReadGmshTest, AFileOfTrianglesAloneIsASurfaceWithItsGroups) {
   const std::string file =
       Header() +

@@ -56,6 +56,25 @@ TEST(CheckSurface, RefusesAShellThatIsThereTwice) {
                         "first triangles 0 and 12"));
 }
 
+TEST(CheckSurface, TellsClosedShellsThatTouchFromAShellThatIsThereTwice) {
+  // Two tetrahedra that share the face 0-1-2.
+  const SurfaceMesh touching{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, -1}},
+                             {{0, 2, 1},
+                              {0, 1, 3},
+                              {1, 2, 3},
+                              {2, 0, 3},  //
+                              {0, 1, 2},
+                              {1, 0, 4},
+                              {2, 1, 4},
+                              {0, 2, 4}}};
+  EXPECT_THAT(Refused(touching),
+              HasSubstr("MESH_DUPLICATE_SHELL: 1 triangles lie on another with the same corners, "
+                        "first triangles 0 and 4 at (0, 0, 0) m, because closed shells touch"));
+  SurfaceMesh turned = Box();
+  for (const auto& [a, b, c] : Box().triangles) turned.triangles.push_back({a, c, b});
+  EXPECT_THAT(Refused(turned), HasSubstr("keep one shell of those that are there twice"));
+}
+
 TEST(CheckSurface, RefusesAnOpenSurfaceAndCountsItsOpenEdges) {
   SurfaceMesh open = Box();
   open.triangles.pop_back();
