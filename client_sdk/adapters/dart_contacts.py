@@ -10,8 +10,8 @@ FLOOR = {"mass_kg": 1e6, "radius_m": 1}
 
 class DartContacts:
     """What a step of a stream or trace takes: `trace.step(time, **contacts.read(world))`. Open the stream or trace with
-    frame="scene". `striker` is the substance of bodies without a sound, which count as immovable and flat. `roughness_depth` and
-    `irregularity_length` (metres) let slides and rolls be heard, as carillon.Contacts says."""
+    frame="scene". `striker` is the substance of bodies without a sound, which count as immovable and flat.
+    `roughness_depth` and `irregularity_length` (metres) let slides and rolls be heard, as carillon.Contacts says."""
 
     def __init__(self, *, striker="", roughness_depth=0.0, irregularity_length=0.0):
         self._settings = {"striker": carillon.striker(striker, **FLOOR),

@@ -128,8 +128,8 @@ class Poses:
 
 def striker(name: str = "", **figures: float) -> contact_pb2.HertzContact:
     """Describes the body that strikes: a named one, such as "wood", or a floor of a material, such as "concrete", with
-    figures that override those of the named one, or figures alone. They are mass_kg, radius_m, young_pa and poisson_ratio of the striker, approach_speed_m_per_s,
-    reduced_mass_kg and reduced_radius_m."""
+    figures that override those of the named one, or figures alone. They are mass_kg, radius_m, young_pa and
+    poisson_ratio of the striker, approach_speed_m_per_s, reduced_mass_kg and reduced_radius_m."""
     own = {f"striker_{key}": figures.pop(key) for key in STRIKER_FIGURES if key in figures}
     checks.refuse_unknown(figures, [*STRIKER_FIGURES, "approach_speed_m_per_s", "reduced_mass_kg", "reduced_radius_m"],
                           "striker")

@@ -50,8 +50,8 @@ class Line:
 
 @dataclasses.dataclass(frozen=True)
 class Extraction:
-    """The lines of recorded strikes. `room_t60_s` is None where no room was told apart. `gain_fall_db` is by how much an
-    automatic gain control turned the level down at the blows, as the noise tells, or zero; it changes the decays."""
+    """The lines of recorded strikes. `room_t60_s` is None where no room was told apart. `gain_fall_db` is by how much
+    an automatic gain control turned the level down at the blows, as the noise tells, or zero; it changes the decays."""
 
     lines: list[Line]
     strike_count: int
@@ -63,8 +63,8 @@ class Extraction:
 class Fit:
     """A material, and how it explains the recordings. Errors are standard errors, those of E/rho and of the damping are
     relative, the latter the median over the matched lines. `text` is the material as a file that `carillon ...
-    --material-file` reads. `nearest_material` is the named material nearest to it, and `cautions` say what to check, for
-    example if none is near. `laws` are the laws of damping, the chosen one
+    --material-file` reads. `nearest_material` is the named material nearest to it, and `cautions` say what to check,
+    for example if none is near. `laws` are the laws of damping, the chosen one
     first, as `carillon --json material fit` prints them, and empty where a room or noise hides most decays. `modes_hz`
     has the frequencies of all modes of each body with that material. `residual` is what the matched modes leave of the
     first strike, and `residual_shares` its share of the energy from one second to another."""
