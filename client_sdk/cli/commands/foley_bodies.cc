@@ -178,6 +178,8 @@ absl::Status SetBody(const FoleyOptions& options, const motion::SceneBody& given
   if (body.name != "floor" || !options.floor_m) {
     RETURN_IF_ERROR(SetSurface(options, body));
     Scale(options.metres_per_unit, body);
+    motion::TurnOutward(body.surface);
+    motion::TurnOutward(body.collider);
   }
   if (options.friction > 0) body.friction = options.friction;
   ASSIGN_OR_RETURN(sounds.material, MaterialOf(options, body.name, given.material));

@@ -125,4 +125,9 @@ bool IsClosed(const BodySurface& surface) {
   return true;
 }
 
+void TurnOutward(BodySurface& surface) {
+  if (surface.triangles.empty() || !IsClosed(surface) || Measure(surface).volume_m3 >= 0) return;
+  for (auto& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
+}
+
 }  // namespace carillon::motion

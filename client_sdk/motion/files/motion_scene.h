@@ -63,4 +63,8 @@ SolidMeasures Measure(const BodySurface& surface);
 /// True if each edge has two triangles that run along it in opposite directions.
 bool IsClosed(const BodySurface& surface);
 
+/// Turns the triangles of a closed surface whose normals point inward, so that its volume is
+/// positive.
+void TurnOutward(BodySurface& surface);
+
 }  // namespace carillon::motion

@@ -44,7 +44,8 @@ def write_obj(path, vertices, triangles):
 
 
 def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel", drawn=SIDES_M,
-               collider=None, scale=(1, 1, 1), interpolation="LINEAR", flips=False, later_s=0):
+               collider=None, scale=(1, 1, 1), interpolation="LINEAR", flips=False, later_s=0,
+               inward=False):
     """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z. With `flips` the
     quaternion of the bar, which does not turn, changes its sign at each key."""
     blob, views, accessors = b"", [], []
@@ -60,6 +61,7 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
     def mesh(sides, named):
         vertices, triangles = box(sides)
         corners = vertices[numpy.array(triangles).ravel()]  # a corner for each triangle, as exporters write them
+        corners = corners[::-1] if inward else corners
         primitive = {"attributes": {"POSITION": accessor(corners, "VEC3", 5126)}, "material": named}
         return {"primitives": [primitive]}
 
@@ -216,6 +218,15 @@ class FoleyTest(DaemonTest):
         self.foley("heavy.glb", "--trace", trace)
         self.check_impacts(trace, 2 * IMPULSE_N_S)
         self.foley("heavy.glb", "--trace", trace, "--material-masses")
+        self.check_impacts(trace)
+
+    def test_normals_that_point_inward_change_neither_masses_nor_impulses(self):
+        trace = self.folder / "inward.contacts"
+        write_gltf(self.folder / "inward.glb", inward=True)
+        self.foley("inward.glb", "--trace", trace)
+        self.check_impacts(trace)
+        write_gltf(self.folder / "inward.glb", inward=True, mass=2 * MASS_KG)
+        self.foley("inward.glb", "--trace", trace, "--material-masses")
         self.check_impacts(trace)
 
     def test_a_collider_that_the_simulator_rounds_touches_in_place_of_the_mesh(self):
