@@ -55,6 +55,22 @@ double AffordableGrowth(const ResolutionGoal& goal, const std::vector<Round>& ro
   return growth;
 }
 
+/// The factor by which the nodes must grow before the accuracy is reached.
+double NecessaryGrowth(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
+  const Round& last = rounds.back();
+  if (goal.accuracy == 0 || last.worst_error == 0) return std::numeric_limits<double>::infinity();
+  const double finer =
+      std::pow(last.worst_error / (kMargin * goal.accuracy), 1 / ErrorPower(rounds));
+  return std::pow(finer, Dimension(last));
+}
+
+/// The factor by which the nodes grow in this many rounds.
+double Growth(const ResolutionGoal& goal, const std::vector<Round>& rounds, size_t count) {
+  return std::min({std::pow(kMostGrowth, static_cast<double>(count)),
+                   AffordableGrowth(goal, rounds), kMaxMeshNodes / rounds.back().node_count,
+                   NecessaryGrowth(goal, rounds)});
+}
+
 bool Refined(const std::vector<Round>& rounds) {
   return rounds.size() < 2 ||
          rounds.back().element_size_m < kSameSize * rounds[rounds.size() - 2].element_size_m;
@@ -97,16 +113,16 @@ std::optional<double> NextElementSize(const ResolutionGoal& goal,
   if (goal.accuracy > 0 && last.worst_error > 0 && last.worst_error <= goal.accuracy) {
     return std::nullopt;
   }
-  const double dimension = Dimension(last);
-  double growth =
-      std::min({kMostGrowth, AffordableGrowth(goal, rounds), kMaxMeshNodes / last.node_count});
-  if (goal.accuracy > 0 && last.worst_error > 0) {
-    const double finer =
-        std::pow(last.worst_error / (kMargin * goal.accuracy), 1 / ErrorPower(rounds));
-    growth = std::min(growth, std::pow(finer, dimension));
-  }
+  const double growth = Growth(goal, rounds, 1);
   if (growth < kLeastGrowth) return std::nullopt;
-  return last.element_size_m * std::pow(growth, -1 / dimension);
+  return last.element_size_m * std::pow(growth, -1 / Dimension(last));
+}
+
+double LaterRounds(const ResolutionGoal& goal, const std::vector<Round>& rounds) {
+  const double next = Growth(goal, rounds, 1);
+  const double all = Growth(goal, rounds, kMostRounds - rounds.size());
+  if (all < kLeastGrowth * next) return kLaterRounds;
+  return std::pow(all / next, rounds.back().thin ? kThinTimePower : kTimePower);
 }
 
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,

@@ -52,6 +52,10 @@ bool SetEquivalentSize(double asked_m, std::vector<Round>& rounds);
 /// Returns the predicted time of a round with this element size, relative to the round `last`.
 double TimeGrowth(const Round& last, double element_size_m);
 
+/// Returns the predicted time of all rounds after the next one, relative to the next one, whose
+/// element size NextElementSize() gave.
+double LaterRounds(const ResolutionGoal& goal, const std::vector<Round>& rounds);
+
 /// Returns a warning for the user about each budget that was exceeded. A budget can be exceeded in
 /// two ways: the first round is always solved, and later rounds are chosen by a predicted cost.
 std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used_s,
@@ -59,7 +63,7 @@ std::vector<std::string> OverrunWarnings(const ResolutionGoal& goal, double used
 
 /// Predicted time of all later rounds, relative to the current round. The first number applies
 /// while the first round runs, because its errors are not known yet. The second number applies
-/// while a later round runs, because that round should be the last.
+/// while a later round runs that should be the last.
 inline constexpr double kLaterRoundsAfterFirst = 6, kLaterRounds = 0.1;
 
 }  // namespace carillon::precompute

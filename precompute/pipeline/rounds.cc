@@ -120,13 +120,14 @@ Rounds::Next Rounds::Plan(const Solved& solved) {
     return Next::kUniformMesh;
   }
   const Round& last = rounds_.back();
-  const std::optional<double> size_m = NextElementSize(is_free_ ? kUsualGoal : asked_, rounds_);
+  const ResolutionGoal& goal = is_free_ ? kUsualGoal : asked_;
+  const std::optional<double> size_m = NextElementSize(goal, rounds_);
   if (!size_m) return Next::kNothing;
   meshing_.relative_size = asked_.given() ? Grade(body.mesh, model, last, *size_m) : SizeField();
   meshing_.most_node_count = kMostOfUniform * UniformNodeCount(last, *size_m);
   meshing_.element_size_m = *size_m;
   forecast_ = {.expected_s = (ended.seconds - begun_.seconds) * TimeGrowth(last, *size_m),
-               .later_rounds = kLaterRounds};
+               .later_rounds = LaterRounds(goal, rounds_)};
   return Next::kFinerMesh;
 }
 

@@ -56,6 +56,13 @@ TEST(Resolution, GivesAGradedMeshTheSizeOfTheUniformOneAndTellsWhetherItIsFiner)
   EXPECT_FALSE(SetEquivalentSize(3e-3, rounds));
 }
 
+TEST(Resolution, ForeseesTheRoundsAfterTheNextOne) {
+  EXPECT_LT(LaterRounds({.accuracy = 0.01}, {Solved(4, 0.02)}), 0.2) << "the next one is the last";
+  // A thin wall needs (0.5/0.008)^(2/2.4) = 31 times the nodes, of which the next round has 6.
+  EXPECT_NEAR(LaterRounds({.accuracy = 0.01}, {Solved(4, 0.5)}), 6.2, 0.5);
+  EXPECT_LT(LaterRounds({.accuracy = 0.01, .budget_s = 5}, {Solved(4, 0.5)}), 0.2);
+}
+
 TEST(Resolution, KeepsToItsBudgets) {
   Round dear = Solved(4, 0.5);
   dear.cpu_s = 9;
