@@ -82,7 +82,7 @@ def of_sound(scene, folder, figures, jobs):
         lines.append(f"warning: no impact in this range: what is heard rests, rolls or slides{full}")
     if "paper's coupling" in (folder / "summary").read_text(encoding="utf-8", errors="replace"):
         lines.append("warning: without the radiation of the bodies, whose computation takes minutes, levels are not "
-                     "physical: what is louder than what may be wrong by 8 dB and more")
+                     "physical: a body may be too loud or too soft beside another")
     whole = _peak(folder / "sound.wav")
     for stem in sorted((folder / "stems").glob("*.wav")):
         share = _peak(stem) / whole if whole > 0 else 1
