@@ -22,12 +22,11 @@ constexpr int kMostOrder = 18, kMostHeight = 160, kLeastHeight = 10;
 /// is taken whole and by its first half.
 constexpr std::array<double, 3> kStarts_s = {0.006, 0.010, 0.0175};
 constexpr std::array<double, 2> kLengths = {1, 0.5};
-constexpr size_t kMostRuns = kMostOrder * kStarts_s.size() * kLengths.size();
+constexpr size_t kRuns = kMostOrder * kStarts_s.size() * kLengths.size();
 constexpr double kLeastStable = 0.4;
 /// A window ends where the power is within 5 dB of the noise, or 45 dB below its greatest.
 constexpr double kOverNoise = 3.2, kBelowPeak = 3.2e-5;
-constexpr double kLongest_s = 2.5, kShortest_s = 0.05;
-constexpr double kBlur_s = 0.01;
+constexpr double kLongest_s = 2.5, kShortest_s = 0.03;
 /// A band with less power than this over the noise has no modes.
 constexpr double kLeastOverNoise = 10;
 constexpr double kMostDecay_per_s = 700;
@@ -109,11 +108,10 @@ class Band {
   std::vector<MeasuredMode> Modes() const {
     std::vector<MeasuredMode> modes;
     if (rings_.empty()) return modes;
-    size_t runs = 0;
-    std::vector<Pole> poles = AllPoles(runs);
+    std::vector<Pole> poles = AllPoles();
     while (true) {
       MeasuredMode mode;
-      if (!TakeMostStable(poles, runs, mode)) break;
+      if (!TakeMostStable(poles, mode)) break;
       // Neighbouring bands overlap a little, so that a line between them is in one at least.
       if (std::abs(mode.frequency_hz - centre_hz_) <= kHalfBand_hz + 5) modes.push_back(mode);
     }
@@ -142,7 +140,7 @@ class Band {
  private:
   void Add(size_t ring, const std::vector<std::complex<double>>& all, size_t onset, double rate) {
     const auto index = [&](double seconds) { return static_cast<size_t>(seconds * rate); };
-    if (all.size() < onset + index(kShortest_s) + index(kBlur_s)) return;
+    if (all.size() < onset + index(kShortest_s)) return;
     const Signal signal(all);
     const size_t tail = (all.size() - onset) / 3;
     double noise = MedianNoise(signal.last(std::min(tail, size_t{200})));
@@ -170,9 +168,9 @@ class Band {
     const double least = std::max(kOverNoise * noise, kBelowPeak * *peak);
     auto end = static_cast<size_t>(peak - power.begin());
     while (end < all.size() && power[end] > least && end < onset + index(kLongest_s)) ++end;
-    // Modes that die sooner than the shortest window are seen with the noise after them. The filter
-    // blurs the end of the recording, too.
-    end = std::clamp(end, onset + index(kShortest_s), all.size() - index(kBlur_s));
+    // The filter blurs the end of the recording, too.
+    end = std::min(end, all.size() - index(0.01));
+    if (end < onset + index(kShortest_s)) return;
     rings_.push_back({.ring = ring,
                       .samples = {all.begin() + static_cast<std::ptrdiff_t>(onset),
                                   all.begin() + static_cast<std::ptrdiff_t>(end)},
@@ -212,17 +210,19 @@ class Band {
     return windows;
   }
 
-  /// Returns the poles of all runs, and counts the runs: windows of modes that die soon have fewer,
-  /// because they are too short for some starts and orders.
-  std::vector<Pole> AllPoles(size_t& run) const {
+  std::vector<Pole> AllPoles() const {
     std::vector<Pole> found;
+    size_t run = 0;
     for (const double start : kStarts_s) {
       for (const double length : kLengths) {
         const auto windows = Windows(start, length);
         size_t longest = 0;
         for (const auto& window : windows) longest = std::max(longest, window.size());
         const int height = std::min(kMostHeight, static_cast<int>(longest * 2 / 5));
-        if (height < kLeastHeight) continue;
+        if (height < kLeastHeight) {
+          run += kMostOrder;
+          continue;
+        }
         for (const auto& poles :
              EspritPoles({windows.begin(), windows.end()}, height, kMostOrder)) {
           for (const std::complex<double>& z : poles) AddPole(z, run, found);
@@ -254,8 +254,8 @@ class Band {
   static void ForEachNear(const std::vector<Pole>& poles, size_t at, Use use) {
     const Pole& centre = poles[at];
     const double hz = FrequencyTolerance(centre), per_s = std::max(1.0, 0.3 * centre.decay_per_s);
-    std::array<double, kMostRuns> distance;
-    std::array<size_t, kMostRuns> nearest;
+    std::array<double, kRuns> distance;
+    std::array<size_t, kRuns> nearest;
     distance.fill(1);
     const auto first =
         std::ranges::lower_bound(poles, centre.frequency_hz - hz, {}, &Pole::frequency_hz);
@@ -267,22 +267,20 @@ class Band {
       distance[pole->run] = d;
       nearest[pole->run] = static_cast<size_t>(pole - poles.begin());
     }
-    for (size_t run = 0; run < kMostRuns; ++run) {
+    for (size_t run = 0; run < kRuns; ++run) {
       if (distance[run] < 1) use(nearest[run]);
     }
   }
 
-  /// Takes the poles of the mode that most of the runs have out of `poles`. Returns whether there
-  /// is one.
-  static bool TakeMostStable(std::vector<Pole>& poles, size_t runs, MeasuredMode& mode) {
+  /// Takes the poles of the mode that most runs have out of `poles`. Returns whether there is one.
+  static bool TakeMostStable(std::vector<Pole>& poles, MeasuredMode& mode) {
     size_t best = 0, best_count = 0;
     for (size_t at = 0; at < poles.size(); ++at) {
       size_t count = 0;
       ForEachNear(poles, at, [&](size_t) { ++count; });
       if (count > best_count) best = at, best_count = count;
     }
-    const double least = kLeastStable * static_cast<double>(runs);
-    if (best_count == 0 || static_cast<double>(best_count) < least) return false;
+    if (static_cast<double>(best_count) < kLeastStable * static_cast<double>(kRuns)) return false;
     std::vector<double> frequencies, decays;
     std::vector<size_t> members;
     ForEachNear(poles, best, [&](size_t at) {
