@@ -233,8 +233,10 @@ std::vector<double> LawErrors(const std::vector<MeasuredDecay>& decays,
   }
   const auto [low, high] = std::ranges::minmax(decays, {}, &MeasuredDecay::frequency_hz);
   std::vector<double> errors;
+  errors.reserve(frequencies_hz.size());
   for (const double hz : frequencies_hz) {
     std::vector<double> deviations;
+    deviations.reserve(drawn.size());
     for (const DampingLaw& law : drawn)
       deviations.push_back(std::abs(std::log(law.DecayPerS(hz) / laws[0].DecayPerS(hz))));
     const auto at = deviations.begin() + static_cast<std::ptrdiff_t>(kQuantile * kLaws);

@@ -171,7 +171,7 @@ absl::Status ShowMaterial(const client::Client& daemon, const std::string& name,
   v1::Material unknown;
   unknown.set_preset(name);
   // Its error names the nearest materials.
-  const absl::Status error = ResolveMaterial(unknown).status();
+  absl::Status error = ResolveMaterial(unknown).status();
   if (name != "list" && name != "show") return error;
   v1::ErrorInfo info = ToErrorInfo(error);
   info.set_message(absl::StrCat("no material is named \"", name,

@@ -10,8 +10,8 @@ namespace carillon::cli {
 namespace {
 
 template <class T>
-void AddFigure(CLI::App& app, const std::string& name, std::optional<T>& target,
-               const std::string& description) {
+void AddOptionalFigure(CLI::App& app, const std::string& name, std::optional<T>& target,
+                       const std::string& description) {
   app.add_option(name, target, description)->group("Material");
 }
 
@@ -38,12 +38,12 @@ void AddMaterial(CLI::App& app, MaterialFigures& material) {
                  "A file with a material as text, as carillon material fit writes it; the figures "
                  "below override it")
       ->group("Material");
-  AddFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
-  AddFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
-  AddFigure(app, "--density", material.density_kg_per_m3, "Density, kg/m^3");
-  AddFigure(app, "--alpha1", material.alpha1_s,
-            "Damping in proportion to stiffness, s; it replaces a loss factor");
-  AddFigure(app, "--alpha2", material.alpha2_per_s, "Damping proportional to mass, 1/s");
+  AddOptionalFigure(app, "--young", material.young_pa, "Young's modulus, Pa");
+  AddOptionalFigure(app, "--poisson", material.poisson_ratio, "Poisson's ratio");
+  AddOptionalFigure(app, "--density", material.density_kg_per_m3, "Density, kg/m^3");
+  AddOptionalFigure(app, "--alpha1", material.alpha1_s,
+                    "Damping in proportion to stiffness, s; it replaces a loss factor");
+  AddOptionalFigure(app, "--alpha2", material.alpha2_per_s, "Damping proportional to mass, 1/s");
   app.add_option("--loss-factor", material.loss_factor,
                  "Damping by a loss factor: ETA, or HZ:ETA,HZ:ETA,...; 0 is no damping but that of "
                  "--alpha1, --alpha2 and the air")
