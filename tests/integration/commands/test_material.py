@@ -57,12 +57,12 @@ class Material(DaemonTest):
 
     def test_a_wrong_sample_rate_is_cautioned_against(self):
         self.assertEqual((self.found.nearest_material, self.found.cautions), ("soda_lime_glass", []))
-        taps = [self.folder / f"slow{number}.wav" for number in range(len(self.taps))]
-        for tap, slow in zip(self.taps, taps):
+        taps = [self.folder / f"fast{number}.wav" for number in range(len(self.taps))]
+        for tap, fast in zip(self.taps, taps):
             sound = carillon.Sound.load(tap)
-            carillon.Sound(sound.samples, round(sound.sample_rate_hz / 1.088)).save(slow)
+            carillon.Sound(sound.samples, round(sound.sample_rate_hz * 1.088)).save(fast)
         found = carillon.fit.material("plate", taps, density=DENSITY, **self.own)
-        self.assertAlmostEqual(found.young_pa / self.found.young_pa, 1.088**-2, delta=0.005)
+        self.assertAlmostEqual(found.young_pa / self.found.young_pa, 1.088**2, delta=0.01)
         self.assertEqual(len(found.cautions), 1)
         self.assertIn("sample rate", found.cautions[0])
         self.assertIn(found.cautions[0], found.text)
