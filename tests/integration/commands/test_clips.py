@@ -234,8 +234,9 @@ class ClipsTest(DaemonTest):
             peaks = [numpy.abs(sound.read_wave(folder / line["file"])).max() for folder in (out, self.whole)]
             self.assertAlmostEqual(peaks[0], 0.9, places=4)
             raised_db = 20 * numpy.log10(peaks[0] / peaks[1])
-            # Not the same: R 128 leaves out the blocks below -70 LUFS, of which the softer file has more.
-            self.assertAlmostEqual(line["integrated_lufs"] - before["integrated_lufs"], raised_db, delta=3)
+            # Not by the same: R 128 leaves out the blocks below -70 LUFS, of which the softer file has more.
+            risen = line["integrated_lufs"] - before["integrated_lufs"]
+            self.assertTrue(raised_db - 10 < risen < raised_db + 0.3, (risen, raised_db))
         self.run_ended(self.render(out, "--length", 0.3))
         self.assertTrue(all("integrated_lufs" not in line for line in manifest(out)))  # R 128 needs 0.4 s
 
