@@ -22,7 +22,7 @@ class Motion:
     how: str                 # what the poses are, as text
     steps: bool = False      # each frame is a step of the simulation
     shown: tuple = (1, 24)   # the scene's first frame, and its frames a second
-    hints: list = dataclasses.field(default_factory=list)  # what of the whole simulation may look odd
+    hints: list = dataclasses.field(default_factory=list)  # why all of the simulation may look odd, and the remedy
 
     def write(self, path, scene):
         scale = settings.metres_per_unit(scene)

@@ -20,9 +20,8 @@ const v1::MaterialCatalogue& Materials();
 /// empty name first, which stands for all other regions. The figures outside the regions are those
 /// of the first one, except a Young's modulus and a density that are given. Checks that the figures
 /// are finite and within the ranges that material.proto states. Errors: InvalidArgument, with a
-/// message that begins "UNKNOWN_MATERIAL: " (no such preset; the message has the
-/// nearest, and the figures have all) or "INVALID_MATERIAL: " (a figure is missing or out of
-/// range).
+/// message that begins "UNKNOWN_MATERIAL: " (no such preset; as UnknownName makes it) or
+/// "INVALID_MATERIAL: " (a figure is missing or out of range).
 absl::StatusOr<v1::Material> ResolveMaterial(const v1::Material& material);
 
 std::vector<LossFactorPoint> LossFactorOf(const v1::Material& material);

@@ -14,7 +14,7 @@ const v1::StrikerCatalogue& Strikers();
 /// Returns the names of all strikers, "steel, wood, ...".
 std::string StrikerNames();
 
-/// Returns a striker. Errors: InvalidArgument (UNKNOWN_STRIKER; lists the nearest names first).
+/// Returns a striker. Errors: InvalidArgument (UNKNOWN_STRIKER, as UnknownName makes it).
 absl::StatusOr<v1::CatalogueStriker> FindStriker(const std::string& name);
 
 }  // namespace carillon

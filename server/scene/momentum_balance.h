@@ -172,7 +172,7 @@ class MomentumBalance {
   Vector3 gravity_{};                    // their median
   bool has_gravity_ = false;
   uint64_t touch_count_ = 0, equal_count_ = 0;
-  uint64_t pair_touch_count_ = 0, mirrored_count_ = 0;  // of contacts of two objects
+  uint64_t pair_touch_count_ = 0, mirrored_count_ = 0;  // both count contacts of two objects
   uint64_t right_count_ = 0, judged_count_ = 0;         // blows
   EngineMistakes counted_{};
   std::optional<double> time_s_;

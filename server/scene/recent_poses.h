@@ -33,9 +33,10 @@ class RecentPoses {
   /// Returns the sum of the speeds, m/s, at which the points move against their directions before
   /// the impulses of this step change them, or nothing if the poses do not tell.
   ///
-  /// Some engines tell the poses after a step, and others those before it. So this is the faster
-  /// of the motions to this step's pose and to the one before, plus the acceleration of the steps
-  /// before that: gravity, above all, which acts in the step of the blow, too. An object keeps its
+  /// Some engines tell the poses after a step, and others those before it. Therefore the function
+  /// takes the faster of two motions, the one to this step's pose and the one to the pose before.
+  /// It adds the acceleration of the earlier steps, which is mostly gravity and acts in the step of
+  /// the blow, too. An object keeps its
   /// pose in a step in which it gets none. One that never had a pose is at rest if another has one.
   std::optional<double> ApproachSpeed(std::span<const Ray> rays) const;
 
@@ -58,7 +59,7 @@ class RecentPoses {
   std::optional<double> Speed(std::span<const Ray> rays, size_t steps_ago) const;
 
   uint64_t step_ = kPoseCount;
-  std::array<double, kPoseCount> times_s_{};  // of the last steps, the newest first
+  std::array<double, kPoseCount> times_s_{};  // the times of the last steps, the newest first
   std::map<uint32_t, Path> paths_;
 };
 

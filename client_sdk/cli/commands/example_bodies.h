@@ -19,8 +19,8 @@ struct Example {
   std::string name;
   std::string description;
   std::string material;
-  std::array<double, 3> point_m;  ///< where the strike hits the body as it is drawn
-  std::string impulse;            ///< that the strike gives the body, N s
+  std::array<double, 3> point_m;  ///< the struck point of the body in its file
+  std::string impulse;            ///< the impulse that the strike gives the body, N s
   ExampleBody (*draw)();
 };
 
