@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# deploy/bench.sh console|decomposition|engines|fit|ingest|mixer|motion|radiation
-# [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
+# deploy/bench.sh NAME [ARGUMENTS OF tests/benchmarks/NAME/run.py...]
 #
 # Installs what is missing, the programs compared with too, builds, runs all of them in turn on the
 # same input, and prints one table.

@@ -64,7 +64,8 @@ void Triangulate(std::span<const int32_t> polygon, const std::vector<Point>& ver
   const std::vector<Flat> flat = Flatten(polygon, vertices);
   std::vector<size_t> left(polygon.size());
   for (size_t i = 0; i < left.size(); ++i) left[i] = i;
-  // The first ear after the last one cut, so that a convex polygon becomes a fan in linear time.
+  // The first ear after the corner beside the last one cut. Cutting off every other corner halves a
+  // convex polygon in each round, so that few of its triangles are long and narrow.
   size_t next = 1;
   while (left.size() >= 3) {
     size_t tried = 0;
@@ -74,7 +75,7 @@ void Triangulate(std::span<const int32_t> polygon, const std::vector<Point>& ver
     triangles.push_back({polygon[left[(ear + left.size() - 1) % left.size()]], polygon[left[ear]],
                          polygon[left[(ear + 1) % left.size()]]});
     left.erase(left.begin() + static_cast<ptrdiff_t>(ear));
-    next = ear % left.size();
+    next = (ear + 1) % left.size();
   }
 }
 

@@ -9,6 +9,7 @@
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/check_surface.h"
 #include "precompute/mesh/surface/nearest_triangle.h"
+#include "precompute/mesh/surface/refine_surface.h"
 #include "precompute/mesh/surface/remesh_surface.h"
 #include "precompute/mesh/surface/surface_shells.h"
 
@@ -22,6 +23,10 @@ constexpr double kSharpDegrees = 75;
 constexpr size_t kLeastTriangles = 2'000;
 /// A result with a larger part of the triangles is not worth the change.
 constexpr double kWorthwhile = 2.0 / 3;
+/// A surface of few triangles is coarsened, too, if it would be divided into this many times the
+/// triangles of a regular mesh and of its own, because they are as narrow as the sides of a
+/// cylinder of hundreds of facets.
+constexpr double kNarrowToRegular = 6, kNarrowToGiven = 3;
 /// Growth of the number of triangles from one try to the next.
 constexpr double kGrowth = 2;
 /// Largest distances between both surfaces, in parts of the thickness at each place.
@@ -67,6 +72,13 @@ double WantedTriangles(const Extent& extent, size_t most_triangles) {
   if (most_triangles > 0) most = std::min(most, static_cast<double>(most_triangles));
   return std::max(std::min(TriangleCount(extent, edge_m), most),
                   static_cast<double>(kLeastTriangles));
+}
+
+/// The number of triangles of the surface once none has longer edges than a mesh of `edge_m`.
+double DividedTriangles(const SurfaceMesh& surface, double edge_m) {
+  constexpr double kLongestToMeanEdge = 1.4;  // as Tetrahedralize divides it
+  return static_cast<double>(
+      RefineSurface(surface, kLongestToMeanEdge * edge_m).surface.triangles.size());
 }
 
 /// Moves the vertices so that the surface lies on both sides of the given one. The middle of a
@@ -143,12 +155,21 @@ std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_
                                                TriangleOrigin origin) {
   constexpr double kTrianglesPerPlain = 4;  // edges half as long
   const bool wrap = origin == TriangleOrigin::kWrap;
-  if (!wrap && surface.triangles.size() <= kMaxUncoarsenedTriangles) return std::nullopt;
   const Extent extent = Measure(surface);
-  const NearestTriangle on_given(surface);
-  const double most = kWorthwhile * static_cast<double>(surface.triangles.size());
+  const auto given_count = static_cast<double>(surface.triangles.size());
   double count = WantedTriangles(extent, most_triangles);
-  if (wrap) count /= kTrianglesPerPlain;
+  double most = kWorthwhile * given_count;
+  if (wrap) {
+    count /= kTrianglesPerPlain;
+  } else if (surface.triangles.size() <= kMaxUncoarsenedTriangles) {
+    count /= kTrianglesPerPlain;
+    const double divided_count = DividedTriangles(surface, EdgeForTriangles(extent, count));
+    if (divided_count < kNarrowToRegular * count || divided_count < kNarrowToGiven * given_count) {
+      return std::nullopt;
+    }
+    most = kWorthwhile * divided_count;
+  }
+  const NearestTriangle on_given(surface);
   for (; count < most; count *= kGrowth) {
     absl::StatusOr<SurfaceMesh> coarse =
         RemeshSurface(surface, EdgeForTriangles(extent, count), kSharpDegrees);

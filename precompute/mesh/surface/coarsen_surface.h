@@ -9,7 +9,7 @@
 
 namespace carillon::precompute {
 
-/// A surface of at most this many triangles is never coarsened.
+/// A surface of at most this many triangles is coarsened only if they are very narrow.
 inline constexpr size_t kMaxUncoarsenedTriangles = 20'000;
 
 /// Where the triangles of a surface come from.
@@ -35,8 +35,12 @@ struct CoarsenedSurface {
 /// A wrap gets edges as long as a surface of few triangles, so that a repaired body costs about as
 /// much as a sound one.
 ///
-/// Returns nothing if a given surface has at most kMaxUncoarsenedTriangles triangles, or if no
-/// surface with two thirds of its triangles keeps these limits. `surface` must pass CheckSurface.
+/// Triangles so narrow that a mesh would divide them into six times as many as it needs get such
+/// edges, too.
+///
+/// Returns nothing if a given surface has at most kMaxUncoarsenedTriangles triangles, none of which
+/// is so narrow, or if no surface with two thirds of its triangles keeps these limits. `surface`
+/// must pass CheckSurface.
 std::optional<CoarsenedSurface> CoarsenSurface(const SurfaceMesh& surface, size_t most_triangles,
                                                TriangleOrigin origin = TriangleOrigin::kGiven);
 

@@ -93,7 +93,7 @@ function watchRing() {
     figures.outputs.push(performanceTime + 1000 * ((frame + at) / player.context.sampleRate - contextTime));
     figures.worklets.push(performance.now());
   };
-  player.node.port.postMessage({ tap: true });
+  player.observe({ tap: true });
 }
 
 async function inPage(work) {
@@ -196,7 +196,7 @@ const measurements = {
     await page.waitForFunction(() => carillonConsole.player.node);
     await sleep(15000);
     // What the browser itself did not put out in time is a gap, too.
-    const gapsNow = () => page.evaluate(() => [carillonConsole.player.underruns, carillonConsole.player.context.playbackStats?.underrunEvents]);
+    const gapsNow = () => page.evaluate(() => [carillonConsole.player.underruns, carillonConsole.player.browserGaps]);
     const before = await gapsNow();
     const kinds = processes();
     const cpu = Object.fromEntries(Object.entries(kinds).map(([kind, pids]) => [kind, total(pids, cpuSeconds)]));
@@ -226,7 +226,7 @@ const measurements = {
     const heard = page.evaluate(() => new Promise((resolve) => {
       const { player } = carillonConsole;
       player.onSamples = (samples) => { if (samples.some((sample) => Math.abs(sample) > 1e-7)) resolve(Date.now()); };
-      player.node.port.postMessage({ tap: true });
+      player.observe({ tap: true });
     }));
     await clickBody(page);
     tell({ struckable_ms: struckable, heard_ms: await heard - began, faults: await page.locator('.fault').count() });

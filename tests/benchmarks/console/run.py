@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).resolve().parent
@@ -71,8 +72,8 @@ def simulator(server, mesh):
             bar = client.create_model(mesh, material="structural_steel")
             bars = [scene.add(bar) for _ in range(3)]
             with scene.stream(step=0.1, delay=0.2) as stream:
-                step = 0
-                while not done.wait(0.1):
+                step, start = 0, time.monotonic()
+                while not done.wait(max(0, start + step * 0.1 - time.monotonic())):
                     stream.step(step * 0.1, impacts=carillon.Impacts(bars[step % 3], [[0, 0, 0]], [[0, 0, 0.02]]))
                     began.set()
                     step += 1

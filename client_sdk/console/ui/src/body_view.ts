@@ -30,6 +30,8 @@ export class BodyView {
   private readonly camera = new THREE.PerspectiveCamera(40, 1, 1e-4, 1e4);
   private readonly controls: OrbitControls;
   private readonly dot = new THREE.Mesh(new THREE.SphereGeometry(1, 16, 12), new THREE.MeshBasicMaterial({ color: 0xd43d00, depthTest: false }));
+  /** The strike whose point the dot shows. */
+  private marked?: Strike;
   private model?: ModalModel;
   private readonly marks = new THREE.Group();
   private body?: THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>;
@@ -127,6 +129,7 @@ export class BodyView {
   }
 
   mark(strike: Strike): void {
+    this.marked = strike;
     this.dot.position.set(...strike.point);
     this.dot.scale.setScalar(this.extent * 0.012);
     this.dot.visible = this.dirty = true;
@@ -143,6 +146,13 @@ export class BodyView {
     const point = new THREE.Vector3(...hit.point);
     const vertex = this.corners(hit.triangle).reduce((best, corner) => (this.place(corner).distanceTo(point) < this.place(best).distanceTo(point) ? corner : best));
     return { vertex, point: hit.point, normal: this.normalOf(hit.triangle) };
+  }
+
+  /** Where on the canvas a point of the body is, -1 to 1 each way. */
+  project(point: Strike['point']): { x: number; y: number } {
+    this.camera.updateMatrixWorld();
+    const { x, y } = new THREE.Vector3(...point).project(this.camera);
+    return { x, y };
   }
 
   /** The point that is farthest from the body's middle, along the normal there. */
@@ -233,6 +243,7 @@ export class BodyView {
     const factor = moved ? BEND * this.extent / this.largest : 0;
     for (let i = 0; i < places.length; i += 1) places[i] = vertices[i]! + (moved ? factor * moved[i]! : 0);
     position!.needsUpdate = true;
+    if (this.marked && this.dot.visible) this.carryDot(this.marked, places);
     if (!withColors) return;
     const shade = new THREE.Color();
     for (let i = 0; i < places.length; i += 3) {
@@ -241,6 +252,12 @@ export class BodyView {
       (moved ? shade.lerpColors(RAMP[stop]!, RAMP[stop + 1]!, place - stop) : REST_COLOR).toArray(colors, i);
     }
     color!.needsUpdate = true;
+  }
+
+  /** Moves the dot with the vertex nearest to it. */
+  private carryDot({ point, vertex }: Strike, places: Float32Array): void {
+    const moved = new THREE.Vector3().fromArray(places, 3 * vertex).sub(this.place(vertex));
+    this.dot.position.set(...point).add(moved);
   }
 
   private lookAt(geometry: THREE.BufferGeometry): void {

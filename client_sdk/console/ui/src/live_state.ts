@@ -84,6 +84,7 @@ function bodiesOf(one: Scene): Link {
 }
 
 function stepsOf(): Link {
+  if (sceneName.value === state.sceneName()) return { name: 'Contact stream', state: 'unknown', says: 'This page strikes in it; it has no simulator.' };
   const running = [...streams.value.values()].filter((stream) => !stream.ended && Date.now() - stream.seenMs < RUNNING_MS);
   const steps = running.reduce((sum, stream) => sum + Number(stream.report.stepCount), 0);
   if (running.length) return { name: 'Contact stream', state: 'well', says: `${running.length} running, ${steps} steps` };
@@ -196,7 +197,7 @@ repeat(POSE_PERIOD_MS, async () => {
 async function watch(name: string, signal: AbortSignal): Promise<void> {
   while (!signal.aborted) {
     try {
-      for await (const news of state.services.contacts.watchContacts({ scene: name }, { signal })) take(news);
+      for await (const news of state.services.contacts.watchContacts({ scene: name }, { signal })) if (!signal.aborted) take(news);
     } catch {
       // The daemon is away, or the scene is gone.
     }
@@ -228,10 +229,10 @@ effect(() => {
   const name = sceneName.value;
   if (!watching.value || !name || !state.reached.value) return undefined;
   const stop = new AbortController();
-  blows.value = [];
+  blows.value = newBlows = [];
   chosen.value = undefined;
   heardMs = 0;
-  streams.value = new Map();
+  streams.value = newStreams = new Map();
   void watch(name, stop.signal);
   return () => stop.abort();
 });

@@ -204,8 +204,10 @@ const NOTES = ['C', 'C#', 'D', 'D#', 'E', 'F', 'F#', 'G', 'G#', 'A', 'A#', 'B'];
 
 /** The frequency that 'A4', 'C#5' or '440' names, Hz. */
 export function hzOf(text: string): number | undefined {
-  const [, letter, octave] = /^([A-G]#?)(\d)$/.exec(text.trim().toUpperCase()) ?? [];
-  const hz = letter ? 440 * 2 ** ((NOTES.indexOf(letter) + 12 * (Number(octave) + 1) - 69) / 12) : Number(text);
+  const [, letter, sign, octave, cents] = /^([A-G])(#|♯|b|♭)?(\d)(?:\s*([+−-]\s*\d+))?$/i.exec(text.trim()) ?? [];
+  const semitones = letter ? NOTES.indexOf(letter.toUpperCase()) + (!sign ? 0 : /[#♯]/.test(sign) ? 1 : -1) + 12 * (Number(octave) + 1) - 69 : 0;
+  const hz = letter ? 440 * 2 ** ((semitones + Number((cents ?? '0').replace('−', '-').replace(/\s/g, '')) / 100) / 12)
+    : Number(text.trim().replace(/\s*hz$/i, ''));
   return hz > 0 ? hz : undefined;
 }
 

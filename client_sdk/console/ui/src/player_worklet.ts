@@ -11,7 +11,7 @@ declare class AudioWorkletProcessor { readonly port: MessagePort; }
 
 const TAPS = 32, PHASES = 512, QUANTUM = 128;
 const FIRST_TARGET = 512, LEAST_TARGET = 512, MORE = 256;
-/** What the machine kept from running once, it soon keeps from running again. */
+/** What the machine kept from running once, it soon keeps from running again: each gap doubles the time without one. */
 const CALM_S = 10;
 const MOST_RATIO_CHANGE = 0.004, GAIN = 2e-6, SMOOTHING = 0.02;
 /** Frames beyond the target that are left out at once: the ratio would take minutes. */
@@ -46,9 +46,9 @@ class Player extends AudioWorkletProcessor {
   private playing = false;
   private adapt = true;
   private tap = false;
-  private underruns = 0;
   private leastSlack = Infinity;
   private calm = 0;
+  private calmS = CALM_S;
 
   constructor() {
     super();
@@ -123,15 +123,16 @@ class Player extends AudioWorkletProcessor {
     this.playing = false;
     this.target += MORE;
     this.calm = 0;
-    this.port.postMessage({ underruns: this.underruns += 1, target: this.target });
+    this.calmS *= 2;
+    this.port.postMessage({ underrun: true, target: this.target });
     return true;
   }
 
-  /** After CALM_S, lowers the target as far as a slack of MORE would have been left, in steps that no ear hears as pitch. */
+  /** After a calm time, lowers the target as far as a slack of MORE would have been left, in steps that no ear hears as pitch. */
   private relax(slack: number, frames: number): void {
     this.leastSlack = Math.min(this.leastSlack, slack);
     this.calm += frames;
-    if (this.calm < CALM_S * sampleRate) return;
+    if (this.calm < this.calmS * sampleRate) return;
     const less = Math.min(this.leastSlack - MORE, this.target - LEAST_TARGET, 2 * MORE);
     if (less > 0) {
       this.target -= less;

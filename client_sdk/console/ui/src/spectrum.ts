@@ -14,7 +14,7 @@ export function drawSpectrum(canvas: HTMLCanvasElement, modes: SoundingMode[], k
   pen.scale(ratio, ratio);
   pen.clearRect(0, 0, width, height);
   const x = (hz: number) => MARGIN.left + (width - MARGIN.left - MARGIN.right) * Math.log(hz / LOW_HZ) / Math.log(HIGH_HZ / LOW_HZ);
-  const topDb = Math.ceil(Math.max(40, ...modes.map((mode) => 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9))) / 10) * 10;
+  const topDb = Math.ceil(Math.max(40, ...[...modes, ...kept].map((mode) => 20 * Math.log10(mode.levelPa / 2e-5 + 1e-9))) / 10) * 10;
   const bottom = height - MARGIN.bottom;
   const y = (db: number) => MARGIN.top + (bottom - MARGIN.top) * (topDb - db) / SPAN_DB;
   drawAxes(pen, getComputedStyle(canvas).color, x, y, topDb, width, bottom);

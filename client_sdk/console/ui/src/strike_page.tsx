@@ -64,24 +64,20 @@ export async function strikeOutermost(at = view?.outermost()): Promise<void> {
   if (at) await strikeAndShow(at);
 }
 
-/** The place of the keyboard's point on the canvas, -1 to 1 each way. */
-const cursor = { x: 0, y: 0 };
-
 function keyOnBody(event: KeyboardEvent) {
   const step = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] } as Record<string, [number, number]>)[event.key];
   const share = event.ctrlKey ? 0.1 : 1;
   if (step && event.shiftKey) {
-    const next = { x: cursor.x + 0.02 * share * step[0], y: cursor.y + 0.02 * share * step[1] };
-    const at = view?.pick(next.x, next.y);
+    const from = state.strike.value ? view!.project(state.strike.value.point) : { x: 0, y: 0 };
+    const at = view?.pick(from.x + 0.02 * share * step[0], from.y + 0.02 * share * step[1]);
     if (at) {
-      Object.assign(cursor, next);
       state.strike.value = at;
       view?.mark(at);
       void state.readRow(at);
     }
   } else if (step) view?.turn(0.1 * share * step[0], 0.1 * share * step[1]);
   else if (event.key === ' ') {
-    const at = view?.pick(cursor.x, cursor.y) ?? state.strike.value;
+    const at = state.strike.value ?? view?.pick(0, 0);
     if (at) void strikeAndShow(at);
   } else return;
   event.preventDefault();
@@ -100,7 +96,8 @@ function Spectrum() {
     if (mode) chooseMode(mode.index);
   };
   return <figure><figcaption>Modes at this point: dB above 20 µPa in air at 1 m, before the hammer softens them; a line to the
-    left is how far a mode may lie below{state.kept.value ? '; A in orange' : ''}</figcaption>
+    left is how far a mode may lie below{state.radiation.value === 'included' ? '' : '; by a rule of thumb, without radiation, which may be 30 dB off'}{state.kept.value
+      ? `; in orange A: ${state.kept.value.materialName.replaceAll('_', ' ')}, size × ${state.kept.value.size.toFixed(2)}` : ''}</figcaption>
     <canvas ref={canvas} class="spectrum" onClick={choose} aria-hidden="true" /></figure>;
 }
 
@@ -212,18 +209,28 @@ function MaterialChoice() {
 
 /** The size by a number, or by the note that the lowest mode is to have. */
 function ExactSize() {
+  /** Says what is wrong beside the field; it stays as it was typed. */
+  const refuse = (field: HTMLInputElement, says: string) => {
+    field.setCustomValidity(says);
+    if (says) field.reportValidity();
+  };
   const set = (size: number) => {
-    if (!(size > 0)) return;
     state.size.value = size;
     updateAndStrike();
   };
-  const tune = (text: string) => {
-    const hz = hzOf(text), { model, material } = state;
+  const exactly = (field: HTMLInputElement) => {
+    const size = Number(field.value);
+    refuse(field, size > 0 ? '' : 'A size is above 0.');
+    if (size > 0) set(size);
+  };
+  const tune = (field: HTMLInputElement) => {
+    const hz = hzOf(field.value), { model, material } = state;
+    refuse(field, hz || !field.value ? '' : 'Give a note, such as A4, Bb4 or A4 +20 (cents), or a frequency in Hz.');
     if (hz && model.value && material.value) set(lowestHz(model.value, material.value, 1) / hz);
   };
-  return <p class="exact"><label>Exactly <input type="number" min="0" step="any" value={Number(state.size.value.toFixed(5))}
-    onChange={(event) => set(Number(event.currentTarget.value))} /></label>
-    <label>Tune mode 1 to <input placeholder="A4 or 440" onChange={(event) => tune(event.currentTarget.value)} /></label></p>;
+  return <p class="exact"><label>Exactly <input type="number" step="any" value={Number(state.size.value.toFixed(5))}
+    onInput={(event) => event.currentTarget.setCustomValidity('')} onChange={(event) => exactly(event.currentTarget)} /></label>
+    <label>Tune mode 1 to <input placeholder="A4 or 440" onInput={(event) => event.currentTarget.setCustomValidity('')} onChange={(event) => tune(event.currentTarget)} /></label></p>;
 }
 
 function Controls() {
@@ -240,7 +247,7 @@ function Controls() {
       <button disabled={!state.strike.value} onClick={strikeAgain}>Strike again</button>
       <button disabled={!state.strike.value} onClick={() => void state.attempt('rendering', () => saveStrike())}>Save WAV</button>
       <button disabled={!state.model.value} onClick={state.keep}>Keep as A</button>
-      <button disabled={!state.kept.value} onClick={() => void state.swap().then(() => { if (state.strike.value) strikeAgain(); })}>Swap with A</button>
+      <button disabled={!state.kept.value} title="What you hear now becomes A, and A what you hear" onClick={() => void state.swap().then(() => { if (state.strike.value) strikeAgain(); })}>Swap with A</button>
     </p></section>;
 }
 

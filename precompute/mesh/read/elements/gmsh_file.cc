@@ -29,6 +29,11 @@ class GmshParser {
   explicit GmshParser(const std::string& bytes) : lines_(bytes) {}
 
   absl::StatusOr<ElementFile> Parse() && {
+    if (const size_t first = lines_.rest().find_first_not_of(" \t\r\n");
+        first < lines_.rest().size() && lines_.rest()[first] == '(') {
+      return Refusal(absl::StatusCode::kInvalidArgument, "MESH_UNREADABLE",
+                     "the file is a .msh of Fluent, not of Gmsh: export the body's surface as STL");
+    }
     while (const std::optional<std::string_view> section = NextSection()) {
       if (*section == "$NOD" || *section == "$ELM") return Unreadable("its version is 1");
       RETURN_IF_ERROR(ReadSection(*section));

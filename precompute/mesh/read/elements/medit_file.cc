@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "precompute/mesh/read/text/number_stream.h"
 #include "proto/cpp/error_reason.h"
@@ -38,16 +39,21 @@ constexpr std::array<std::string_view, 8> kElementNames = {"Hexahedra", "Prisms"
                                                            "Polyhedra", "Polygons",  "Triangles",
                                                            "Quadrilat", "Tetrahedra"};
 
+/// Whether a word of the file is a keyword. Some programs write keywords in lower case.
+bool Same(std::string_view word, std::string_view keyword) {
+  return absl::EqualsIgnoreCase({word.data(), word.size()}, {keyword.data(), keyword.size()});
+}
+
 class MeditParser {
  public:
   explicit MeditParser(const std::string& bytes) : bytes_(bytes), stream_(bytes, false) {}
 
   absl::StatusOr<ElementFile> Parse() && {
     int version = 0;
-    if (stream_.NextWord() != "MeshVersionFormatted" || !stream_.Take(version)) {
+    if (!Same(stream_.NextWord(), "MeshVersionFormatted") || !stream_.Take(version)) {
       return Unreadable("it is no text of Medit");
     }
-    for (std::string_view word = stream_.NextWord(); !word.empty() && word != "End";
+    for (std::string_view word = stream_.NextWord(); !word.empty() && !Same(word, "End");
          word = stream_.NextWord()) {
       if (std::isalpha(static_cast<unsigned char>(word[0])) == 0) {
         return Unreadable(absl::StrCat(QuotedText(word), " where a section begins"));
@@ -67,13 +73,16 @@ class MeditParser {
   }
 
   absl::Status ReadSection(std::string_view keyword) {
-    if (keyword == "Dimension") return ReadDimension();
-    if (keyword == "Vertices") return ReadVertices();
-    const auto* kind = std::ranges::find(kMeditKinds, keyword, &MeditKind::keyword);
+    if (Same(keyword, "Dimension")) return ReadDimension();
+    if (Same(keyword, "Vertices")) return ReadVertices();
+    const auto* kind = std::ranges::find_if(
+        kMeditKinds, [&](std::string_view known) { return Same(keyword, known); },
+        &MeditKind::keyword);
     if (kind != kMeditKinds.end()) return ReadElements(*kind);
     uint64_t count = 0;
-    const bool has_elements = std::ranges::any_of(
-        kElementNames, [&](std::string_view name) { return keyword.starts_with(name); });
+    const bool has_elements = std::ranges::any_of(kElementNames, [&](std::string_view name) {
+      return Same(keyword.substr(0, name.size()), name);
+    });
     if (has_elements && stream_.Take(count) && count > 0) {
       return UnsupportedElements(EscapedText(keyword.substr(0, 60)));
     }

@@ -182,6 +182,7 @@ TEST_F(ReadGmshTest, BadFilesAreRefused) {
   const std::vector<std::pair<std::string, const char*>> cases = {
       {"$MeshFormat\n4 0 8\n$EndMeshFormat\n",
        "MESH_UNREADABLE: the file cannot be read as Gmsh MSH 2.2 or 4.1: its version is \"4\""},
+      {"\n(0 \"a case of Fluent\")\n(2 3)\n", "a .msh of Fluent"},
       {"$MeshFormat\n4.1 1 4\n", "numbers have not eight bytes"},
       {OneTet("0 0 1", "1 1 0 1 2"), "MESH_EMPTY: "},
       {OneTet("0 0 1", "1 4 2 0 0 1 2 3 5"),

@@ -52,6 +52,39 @@ TEST(CoarsenSurface, LeavesASurfaceOfFewTrianglesAlone) {
   EXPECT_FALSE(CoarsenSurface(MakeSphereSurface(0.1, 4), 0).has_value());
 }
 
+/// A cylinder of 60 by 100 mm with a fan of triangles at each end.
+SurfaceMesh Cylinder(int facets) {
+  SurfaceMesh surface;
+  for (const double z : {0.0, 0.1}) {
+    for (int i = 0; i < facets; ++i) {
+      const double angle = 2 * std::numbers::pi * i / facets;
+      surface.vertices.push_back({0.03 * std::cos(angle), 0.03 * std::sin(angle), z});
+    }
+  }
+  for (int i = 0; i < facets; ++i) {
+    const int j = (i + 1) % facets;
+    surface.triangles.push_back({i, j, facets + j});
+    surface.triangles.push_back({i, facets + j, facets + i});
+    if (i == 0 || j == 0) continue;
+    surface.triangles.push_back({0, j, i});
+    surface.triangles.push_back({facets, facets + i, facets + j});
+  }
+  return surface;
+}
+
+// TetGen gave up on such a body after minutes.
+TEST(CoarsenSurface, ACylinderOfManyFacetsGetsTrianglesThatAreWiderThanAFacet) {
+  const SurfaceMesh fine = Cylinder(300);
+  ASSERT_TRUE(CheckSurface(fine).ok());
+  const std::optional<CoarsenedSurface> coarse = CoarsenSurface(fine, 0);
+  ASSERT_TRUE(coarse.has_value());
+  EXPECT_LT(coarse->surface.triangles.size(), 6000);
+  EXPECT_NEAR(EnclosedVolume(coarse->surface) / EnclosedVolume(fine), 1, 3e-3);
+  EXPECT_LT(coarse->frequency_error, 0.003);
+  EXPECT_TRUE(CheckSurface(coarse->surface).ok());
+  EXPECT_FALSE(CoarsenSurface(Cylinder(60), 0).has_value());
+}
+
 TEST(CoarsenSurface, LeavesAFoilAloneWhoseFormItWouldChange) {
   // A wall of 0.2 mm, whose folds of 2 mm would be cut off.
   SurfaceMesh foil = RefineSurface(MakeBoxSurface({0.1, 0.1, 0.0002}), 0.0011).surface;
