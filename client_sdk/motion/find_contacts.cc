@@ -127,6 +127,44 @@ void SetNearest(const Motion& motion, const SearchBodies& bodies, Confidence& co
   confidence.nearest_gap_m = nearest;
 }
 
+/// How deep a vertex of one body lies inside of another at a frame, m; 0 if none does.
+double Depth(const Motion& motion, const SearchBodies& bodies, size_t one, size_t other,
+             size_t frame) {
+  const auto pose = [&](size_t body) {
+    return motion.bodies[body].poses[motion.bodies[body].poses.size() > 1 ? frame : 0];
+  };
+  const BodyPose of_one = pose(one), of_other = pose(other);
+  double depth_m = 0;
+  for (const Vector& vertex : motion.bodies[one].touching().vertices_m) {
+    const Vector point = of_other.orientation.conjugate() *
+                         (of_one.position_m + of_one.orientation * vertex - of_other.position_m);
+    if (bodies.surfaces[other]->box().exteriorDistance(point) > 0) continue;
+    const double far_m = bodies.surfaces[other]->box().diagonal().norm();
+    if (const auto at = bodies.surfaces[other]->Nearest(point, far_m)) {
+      depth_m = std::max(depth_m, -at->gap_m);
+    }
+  }
+  return depth_m + motion.bodies[one].rounding_m + motion.bodies[other].rounding_m;
+}
+
+/// Says which bodies are deepest in each other in the frames around their blows.
+void SetDeepest(const Motion& motion, const SearchBodies& bodies, FoundContacts& found) {
+  Confidence& confidence = found.confidence;
+  for (const FoundBlow& blow : found.blows) {
+    const double radius_m =
+        std::min(bodies.motions[blow.a].radius_m(), bodies.motions[blow.b].radius_m());
+    for (const size_t frame : {size_t{blow.frame}, size_t{blow.frame} + 1}) {
+      const double depth_m = std::max(Depth(motion, bodies, blow.a, blow.b, frame),
+                                      Depth(motion, bodies, blow.b, blow.a, frame));
+      if (depth_m <= confidence.deepest_part * radius_m) continue;
+      confidence.deepest_part = depth_m / radius_m;
+      confidence.deepest_m = depth_m;
+      confidence.deepest_a = blow.a;
+      confidence.deepest_b = blow.b;
+    }
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_coarse) {
@@ -154,6 +192,7 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
   });
   SetAmbiguity(found, others, motion.frame_s);
   SetNearest(motion, *bodies, found.confidence);
+  SetDeepest(motion, *bodies, found);
   return found;
 }
 

@@ -77,29 +77,90 @@ Turn TurnThrough(const Inertia& inertia, const Turn& from, double time_s,
   return TurnFreely(inertia, at, momentum, time_s - now);
 }
 
-Vector ShootMomentum(const Inertia& inertia, const Turn& from, const Turn& to, double time_s,
-                     const std::vector<TorqueImpulse>& impulses, const Vector& guess) {
+namespace {
+
+/// A momentum to shoot with, and the turn by which it misses.
+struct Shot {
+  Vector momentum = Vector::Zero();
+  Vector missing = Vector::Zero();
+};
+
+/// Changes the momentum by a step of Newton's method, or by a part of it, so that less of the turn
+/// is missing. A slender body needs it, whose moments differ by more than ten times. Returns
+/// whether it could.
+template <typename MissingWith, typename SimpleStep>
+bool TakeNewtonStep(const MissingWith& missing_with, const SimpleStep& simple_step, Shot& shot) {
+  constexpr double kAngle = 1e-5;  // rad, by which each column of the derivative is found
+  Matrix moves, changes;
+  for (int axis = 0; axis < 3; ++axis) {
+    moves.col(axis) = simple_step(kAngle * Vector::Unit(axis));
+    changes.col(axis) = missing_with(shot.momentum + moves.col(axis)) - shot.missing;
+  }
+  const Vector step = -moves * changes.fullPivLu().solve(shot.missing);
+  if (!step.allFinite()) return false;
+  for (double part = 1; part > 1e-3; part /= 2) {
+    const Vector after = missing_with(shot.momentum + part * step);
+    if (after.norm() >= shot.missing.norm()) continue;
+    shot.momentum += part * step;
+    shot.missing = after;
+    return true;
+  }
+  return false;
+}
+
+/// Improves a shot until it hits, or until no step does.
+void Shoot(const Inertia& inertia, const Turn& from, const Turn& to, double time_s,
+           const std::vector<TorqueImpulse>& impulses, Shot& shot) {
   constexpr int kMostSteps = 40;
   constexpr double kSmall = 1e-11;  // rad
-  Vector momentum = guess, best = guess;
-  double least = 1e300;
-  for (int i = 0; i < kMostSteps; ++i) {
-    Vector end = momentum;
-    const Turn reached = TurnThrough(inertia, from, time_s, impulses, end);
-    const Vector missing = RotationVector(to * reached.conjugate());
-    const double size = missing.norm();
-    if (size < least) {
-      least = size;
-      best = momentum;
+  const auto missing_with = [&](Vector momentum) {
+    return RotationVector(to * TurnThrough(inertia, from, time_s, impulses, momentum).conjugate());
+  };
+  // A step as if the inertia in the middle of the way stayed: for most bodies the rest of it
+  // shrinks fast.
+  const Turn middle = from.slerp(0.5, to);
+  const auto simple_step = [&](const Vector& missing) {
+    return Vector(middle * (inertia.tensor_kg_m2 * (middle.conjugate() * missing)) / time_s);
+  };
+  shot.missing = missing_with(shot.momentum);
+  for (int i = 0; i < kMostSteps && shot.missing.norm() > kSmall; ++i) {
+    const Vector simple = shot.momentum + simple_step(shot.missing);
+    const Vector after = missing_with(simple);
+    if (after.norm() < 0.5 * shot.missing.norm()) {
+      shot = {.momentum = simple, .missing = after};
+    } else if (!TakeNewtonStep(missing_with, simple_step, shot)) {
+      return;
     }
-    if (size < kSmall) break;
-    // A step as if the inertia in the middle of the way stayed: the rest of it shrinks fast.
-    const Turn middle = from.slerp(0.5, to);
-    momentum = best + (size > least ? 0.5 : 1.0) *
-                          (middle * (inertia.tensor_kg_m2 * (middle.conjugate() * missing))) /
-                          time_s;
   }
-  return best;
+}
+
+}  // namespace
+
+Vector ShootMomentum(const Inertia& inertia, const Turn& from, const Turn& to, double time_s,
+                     const std::vector<TorqueImpulse>& impulses, const Vector& guess) {
+  constexpr double kNear = 1e-8;  // rad
+  constexpr double kSlender = 10, kFaster = 1.5;
+  constexpr int kBodyCount = 16;
+  Shot best{.momentum = guess};
+  Shoot(inertia, from, to, time_s, impulses, best);
+  const Vector moments = Eigen::SelfAdjointEigenSolver<Matrix>(inertia.tensor_kg_m2).eigenvalues();
+  if (best.missing.norm() < kNear && moments[2] < kSlender * moments[0]) return best.momentum;
+  // A slender body may spin by whole turns about its axis between two frames. The turn without
+  // them is approached from a body with equal moments, for which it is plain.
+  const Matrix plain = Matrix::Identity() * moments.mean();
+  Shot shot{.momentum = plain * RotationVector(to * from.conjugate()) / time_s};
+  for (int i = 0; i <= kBodyCount; ++i) {
+    const double part = static_cast<double>(i) / kBodyCount;
+    Shoot(Inertia((1 - part) * plain + part * inertia.tensor_kg_m2), from, to, time_s, impulses,
+          shot);
+  }
+  const auto speed = [&](const Shot& one) {
+    return AngularVelocity(inertia, from, one.momentum).norm();
+  };
+  const bool is_better = best.missing.norm() < kNear
+                             ? shot.missing.norm() < kNear && kFaster * speed(shot) < speed(best)
+                             : shot.missing.norm() < best.missing.norm();
+  return is_better ? shot.momentum : best.momentum;
 }
 
 }  // namespace carillon::motion

@@ -113,6 +113,10 @@ struct Confidence {
   size_t worst_frame = 0;
   double nearest_gap_m = 0;   ///< from the worst body to any other at that frame
   double worst_radius_m = 0;  ///< how large the worst body is
+  /// How deep one of two bodies that strike each other is inside of the other in some frame, as a
+  /// part of the radius of the smaller one, and which bodies these are.
+  double deepest_part = 0, deepest_m = 0;
+  size_t deepest_a = 0, deepest_b = 0;
 };
 
 /// The contacts that explain a motion.

@@ -141,6 +141,24 @@ class PerformanceTest(DaemonTest):
         with self.assertRaises(TypeError):
             self.c.perform(step=STEP_S, channels=2)
 
+    def test_environments_are_reset_by_a_mask(self):
+        sound = self.begin(environments=3)
+        sound.step(impacts=carillon.Impacts([1] * 3, [POINT] * 3, [IMPULSE] * 3, durations=DURATION_S,
+                                            environments=range(3)))
+        sound.step()
+        sound.reset(numpy.array([False, True, False]))
+        sound.reset([])  # nobody
+        sound.reset([False] * 3)
+        peaks = numpy.abs(sound.step()[0]).max(axis=(1, 2))
+        self.assertEqual(peaks[1], 0)
+        self.assertGreater(min(peaks[0], peaks[2]), 0)
+        rows = carillon.Impacts([1] * 2, [POINT] * 2, [IMPULSE] * 2, durations=DURATION_S, environments=[True, False])
+        for act in (lambda: sound.reset([True, False]), lambda: sound.reset(True), lambda: sound.remove(1, []),
+                    lambda: sound.step(impacts=rows), lambda: self.c.perform(step=0),
+                    lambda: self.c.perform(step=STEP_S, environments=0)):
+            with self.assertRaises(ValueError):
+                act()
+
     def test_asyncio_and_the_shape_of_gymnasium(self):
         async def perform():
             async with carillon.aio.connect(self.daemon.server) as c:

@@ -49,8 +49,10 @@ absl::Status CheckPattern(const std::string& option, const std::string& pattern,
   const auto name = [](std::string* text, const MovingBody& body) {
     absl::StrAppend(text, body.name);
   };
-  return Refused("BODY_UNKNOWN", absl::StrCat(option, " ", pattern, " fits none of the bodies ",
-                                              absl::StrJoin(motion.bodies, ", ", name)));
+  return Refused("BODY_UNKNOWN",
+                 absl::StrCat(option, " ", pattern, " fits none of the bodies ",
+                              absl::StrJoin(motion.bodies, ", ", name),
+                              option == "--mesh" ? "; one that stays needs poses, too" : ""));
 }
 
 absl::Status CheckPatterns(const FoleyOptions& options, const motion::Motion& motion) {

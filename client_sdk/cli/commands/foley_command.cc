@@ -28,6 +28,8 @@ namespace {
 namespace fs = std::filesystem;
 using motion::MovingBody;
 
+/// Engines let bodies overlap by less than this part of the smaller one's radius.
+constexpr double kDeep = 0.1;
 /// Shares of unexplained momentum from which the masses or shapes are doubtful, and from which the
 /// contacts are wrong (docs/motion.md).
 constexpr double kDoubtful = 0.001, kWrong = 0.03;
@@ -89,6 +91,14 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
                   "have acted at another corner or in the next frame%s\n",
                   100 * is.ambiguity, motion.frames_are_steps ? "" : "; more frames a second tell");
   }
+  if (is.deepest_part > kDeep) {
+    absl::FPrintF(
+        stderr,
+        "warning: %s is up to %.3g m inside of %s where they strike: is the height of the "
+        "floor (--floor), the unit (--unit) or a mesh (--mesh) wrong?\n",
+        EscapedText(motion.bodies[is.deepest_a].name), is.deepest_m,
+        EscapedText(motion.bodies[is.deepest_b].name));
+  }
   if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
     absl::FPrintF(stderr,
                   "warning: %.2g %% of the momentum is unexplained, most of it of %s: the contacts "
@@ -103,9 +113,11 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
             : absl::StrCat("the nearest surface is ", absl::SixDigits(is.nearest_gap_m), " m away");
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MOTION_WITHOUT_CONTACT",
-        absl::StrCat("the momentum of ", where, " changes, and ", nearest,
-                     ": is a floor missing (--floor), the unit (--unit) or --gravity wrong, "
-                     "or is the body moved by hand (--driven)? --force renders all the same"));
+        absl::StrCat(
+            "the momentum of ", where, " changes, and ", nearest,
+            ": is a floor missing (--floor), the unit (--unit) or --gravity wrong, a frame "
+            "wrong or held, or the turn too fast for these frames, or is the body moved "
+            "by hand (--driven)? --force renders all the same"));
   }
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MOTION_UNEXPLAINED",

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
@@ -27,9 +28,26 @@ absl::Status Malformed(const std::string& path, absl::string_view what) {
                  absl::StrCat(path, ": ", what));
 }
 
+/// Returns a refusal that names the first gap between the times, if there is one.
+absl::Status CheckGaps(const std::string& path, const std::vector<double>& times) {
+  std::vector<double> spacings_s;
+  for (size_t k = 1; k < times.size(); ++k) spacings_s.push_back(times[k] - times[k - 1]);
+  const auto middle = spacings_s.begin() + static_cast<std::ptrdiff_t>(spacings_s.size() / 2);
+  std::ranges::nth_element(spacings_s, middle);
+  const double usual_s = *middle;
+  for (size_t k = 1; k < times.size() && usual_s > 0; ++k) {
+    if (times[k] - times[k - 1] < 1.5 * usual_s) continue;
+    return Malformed(
+        path, absl::StrCat("frames are missing between ", times[k - 1], " s and ", times[k],
+                           " s, where the others are ", usual_s, " s apart: give each of them"));
+  }
+  return absl::OkStatus();
+}
+
 /// Sets the times of the frames, which must be equally far apart.
 absl::Status SetTimes(const std::string& path, const std::vector<double>& times, Motion& motion) {
   if (times.size() < 2) return Malformed(path, "poses of one time alone are no motion");
+  RETURN_IF_ERROR(CheckGaps(path, times));
   motion.first_time_s = times.front();
   motion.frame_s = (times.back() - times.front()) / static_cast<double>(times.size() - 1);
   for (size_t k = 0; k < times.size(); ++k) {

@@ -19,6 +19,7 @@ const KINDS = ['omni', 'stereo', 'ears', 'ambisonic'];
 function indices(environments) {
   if (environments === undefined || environments === null) return [];
   const list = typeof environments === 'number' ? [environments] : Array.from(environments);
+  if (list.some((index) => !Number.isInteger(index))) throw new TypeError('environments must be indices, and no mask');
   if (!list.length) throw new RangeError('environments is empty; leave it out to mean all of them');
   return list;
 }

@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client_sdk/motion/contact_steps.h"
+#include "client_sdk/motion/free_turn.h"
 #include "tests/client_sdk/motion/fall_truth.h"
 
 namespace carillon::motion {
@@ -86,6 +87,40 @@ TEST(FindContacts, TimesOneBounceWhereverItLiesInItsFrame) {
       EXPECT_NEAR(blows[0].time_s, bounce.time_s, 0.003 * frame_s);
       EXPECT_NEAR(blows[0].impulse.z(), bounce.impulse, 3e-3 * bounce.impulse);
       EXPECT_LT(found->confidence.unexplained, 3e-4);
+    }
+  }
+}
+
+TEST(FindContacts, SaysHowDeepBodiesThatStrikeAreInsideOfEachOther) {
+  Bounce bounce = OneBounce(1.0 / 60, 0.003);
+  const auto good = FindContacts(bounce.motion);
+  ASSERT_TRUE(good.ok()) << good.status();
+  EXPECT_LT(good->confidence.deepest_part, 0.01);
+  for (MovingBody& body : bounce.motion.bodies) {
+    if (body.mass_kg == 0) body.poses.front().position_m.z() += 0.05;
+  }
+  const auto deep = FindContacts(bounce.motion, true);
+  ASSERT_TRUE(deep.ok()) << deep.status();
+  ASSERT_FALSE(deep->blows.empty());
+  EXPECT_GT(deep->confidence.deepest_part, 0.1);
+  EXPECT_LT(deep->confidence.deepest_m, 0.051);
+}
+
+// Rods of steel, 16 cm by 14 by 10 mm, and 18 cm by 7 by 7 mm.
+TEST(ShootMomentum, FindsTheTurnOfASlenderBody) {
+  const Turn from(Eigen::AngleAxisd(1.1, Vector(1, 2, -1).normalized()));
+  for (const Vector& moments :
+       {Vector(4.337e-6, 3.766e-4, 3.780e-4), Vector(5.65e-7, 1.872e-4, 1.872e-4)}) {
+    const Inertia rod(moments.asDiagonal());
+    for (const Vector& speed :
+         {Vector(2, 8, 0), Vector(13, 12, -5), Vector(13, 21, -5.6), Vector(30, 12, 0)}) {
+      const double time_s = 1.0 / 30;
+      const Vector momentum = from * moments.cwiseProduct(speed);
+      const Turn to = TurnFreely(rod, from, momentum, time_s);
+      const Vector turn = RotationVector(to * from.conjugate());
+      const Vector guess = from * (rod.tensor_kg_m2 * (from.conjugate() * turn)) / time_s;
+      const Vector found = ShootMomentum(rod, from, to, time_s, {}, guess);
+      EXPECT_LT((found - momentum).norm(), 1e-5 * momentum.norm()) << moments << "\n" << speed;
     }
   }
 }

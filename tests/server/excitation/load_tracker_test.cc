@@ -45,6 +45,16 @@ TEST(LoadTracker, EveryBounceIsABlow) {
   }
 }
 
+// A block that bounces with a restitution of 0.6, in the steps of 20 ms of a controller.
+TEST(LoadTracker, ABounceThreeEmptyStepsAfterAGreaterOneIsABlowWhole) {
+  LoadTracker load;
+  EXPECT_EQ(load.Next(0.26, 0.02), 1);
+  for (int i = 0; i < 6; ++i) load.Next(0, 0.02);
+  EXPECT_EQ(load.Next(0.156, 0.02), 1);
+  for (int i = 0; i < 3; ++i) load.Next(0, 0.02);
+  EXPECT_EQ(load.Next(0.094, 0.02), 1);
+}
+
 TEST(LoadTracker, ForgetsAContactThatIsLongOver) {
   LoadTracker load;
   load.Next(1, kStepS);

@@ -118,6 +118,10 @@ def settings_of(step: float, environments: int, microphones: Iterable[Microphone
     listed = list(microphones)
     for item in listed:
         checks.expect(item, Microphone, "a microphone")
+    if step == 0:
+        raise ValueError("step is 0; give the duration of a step in seconds")
+    if environments == 0:
+        raise ValueError("environments is 0; a performance has one or more")
     return checks.message(performance_pb2.PerformSettings, "perform", dict(
         step_s=checks.number(step, "step", "the duration of a step in seconds"), environment_count=environments,
         latency_s=checks.number(latency, "latency", "seconds from a contact to its sound"),
@@ -193,10 +197,12 @@ class PerformanceCalls(Block):
     async def reset(self, environments: Environments = None) -> None:
         """Ends the sound of environments, by default of all, at once, and lets them begin anew: their time is zero, and
         their objects and microphones are where they were added. The sound is then that of new environments, bit for
-        bit. Raises CarillonError (PERFORMANCE_MALFORMED) for an environment that is not there, which changes
-        nothing."""
-        await self._send(performance_pb2.PerformRequest(
-            reset=performance_pb2.PerformReset(environments=self._indices(environments))))
+        bit. `environments` are indices, or a mask with a boolean for each, and may be none. Raises CarillonError
+        (PERFORMANCE_MALFORMED) for an environment that is not there, which changes nothing."""
+        named = self._named(environments)
+        if named != []:
+            reset = performance_pb2.PerformReset(environments=named or ())
+            await self._send(performance_pb2.PerformRequest(reset=reset))
 
     @call
     async def step(self, *, contacts: Optional[Contacts] = None, impacts: Optional[Impacts] = None,
@@ -230,13 +236,23 @@ class PerformanceCalls(Block):
 
     def _indices(self, environments: Environments) -> list[int]:
         """Indices for a message, where none means all."""
+        named = self._named(environments)
+        if named == []:
+            raise ValueError("environments is empty; leave it out to mean all of them")
+        return named or []
+
+    def _named(self, environments: Environments) -> Optional[list[int]]:
+        """The indices that are given as one, some, a slice or a mask; None for all."""
         if environments is None:
-            return []
+            return None
         if isinstance(environments, slice):
             return list(range(self.environment_count))[environments]
-        given = [environments] if isinstance(environments, (int, numpy.integer)) else list(environments)
-        if not given:
-            raise ValueError("environments is empty; leave it out to mean all of them")
+        given = list(environments) if numpy.ndim(environments) else [environments]
+        if given and all(isinstance(item, (bool, numpy.bool_)) for item in given):
+            if len(given) != self.environment_count:
+                raise ValueError(f"environments is a mask of {len(given)}, but the performance has "
+                                 f"{self.environment_count}")
+            return [index for index, is_meant in enumerate(given) if is_meant]
         indices = [operator.index(item) for item in given]
         for index in indices:
             self._check(index)
@@ -282,6 +298,8 @@ def _fill(step: performance_pb2.PerformStep, frame: int, reported: Optional[Cont
 
 def _fill_environments(message: Any, environments: Optional[Array], count: int) -> None:
     if environments is not None:
+        if numpy.asarray(environments).dtype == bool:
+            raise ValueError("environments has the index of each row's environment, and is no mask")
         append(message, environment=contacts.handles_of(environments, count, "environments", ENVIRONMENT))
 
 
