@@ -9,8 +9,10 @@ namespace {
 
 /// In common engines, the jitter of resting contacts stays below the usual force times this factor.
 constexpr double kUsualFactor = 3;
-/// So many steps without contact are a flight. Resting contacts flicker for one or two.
-constexpr int kFlightStepCount = 3;
+/// A flight has at least so many steps without contact, and takes so long: a hop of 1 mm. Resting
+/// contacts flicker for one or two steps, and in fine steps for more.
+constexpr size_t kFlightStepCount = 3;
+constexpr double kFlightS = 0.03;
 
 }  // namespace
 
@@ -21,8 +23,9 @@ double LoadTracker::Next(double impulse_newton_seconds, double step_s) {
   forces_newtons_[next_] = force;
   blows_newtons_[next_] = blow;
   next_ = (next_ + 1) % kStepCount;
-  empty_count_ = force > 0 ? 0 : empty_count_ + 1;
-  if (empty_count_ == kFlightStepCount) ForgetBlows();
+  empty_count_ = force > 0 ? 0 : std::min(empty_count_ + 1, kStepCount);
+  empty_s_ = force > 0 ? 0 : empty_s_ + step_s;
+  if (empty_count_ >= kFlightStepCount && empty_s_ >= kFlightS) ForgetBlows();
   return force > 0 ? blow / force : 0;
 }
 
@@ -31,9 +34,7 @@ void LoadTracker::ForgetBlows() {
   blows_newtons_ = {};
 }
 
-bool LoadTracker::idle() const {
-  return std::ranges::all_of(forces_newtons_, [](double force) { return force == 0; });
-}
+bool LoadTracker::idle() const { return empty_count_ >= kStepCount; }
 
 double LoadTracker::Usual() const {
   std::array<double, kStepCount> sorted = forces_newtons_;

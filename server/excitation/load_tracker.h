@@ -13,9 +13,9 @@ namespace carillon {
 /// jitters. A blow is an impulse in one step or a few steps. The part of a step's force that
 /// exceeds three times the usual force is a blow. The usual force is the greater of the median and
 /// the mean over the last steps, including steps without contact. Blows before a flight, which is
-/// three steps without contact, do not count. Therefore a body that comes from flight has no usual
-/// force and strikes with its whole impulse, whereas a body that rests with a jitter does not
-/// strike.
+/// three steps and 30 ms without contact, do not count. Therefore a body that comes from flight has
+/// no usual force and strikes with its whole impulse, whereas a body that rests with a jitter does
+/// not strike.
 class LoadTracker {
  public:
   /// Number of remembered steps. The usual force follows a change after half of them.
@@ -35,7 +35,8 @@ class LoadTracker {
 
   std::array<double, kStepCount> forces_newtons_{};
   std::array<double, kStepCount> blows_newtons_{};  // the parts of these that were blows
-  int empty_count_ = 0;                             // steps since the last contact
+  size_t empty_count_ = kStepCount;                 // steps since the last contact, at most these
+  double empty_s_ = 0;                              // how long they took
   size_t next_ = 0;
 };
 

@@ -247,7 +247,8 @@ class PerformanceCalls(Block):
             return None
         if isinstance(environments, slice):
             return list(range(self.environment_count))[environments]
-        given = list(environments) if numpy.ndim(environments) else [environments]
+        given: list[Any] = ([environments] if isinstance(environments, (int, numpy.integer, numpy.bool_))
+                            else list(environments))
         if given and all(isinstance(item, (bool, numpy.bool_)) for item in given):
             if len(given) != self.environment_count:
                 raise ValueError(f"environments is a mask of {len(given)}, but the performance has "
