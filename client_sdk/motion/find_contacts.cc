@@ -134,17 +134,18 @@ double Depth(const Motion& motion, const SearchBodies& bodies, size_t one, size_
     return motion.bodies[body].poses[motion.bodies[body].poses.size() > 1 ? frame : 0];
   };
   const BodyPose of_one = pose(one), of_other = pose(other);
+  const double rounding_m = motion.bodies[one].rounding_m + motion.bodies[other].rounding_m;
   double depth_m = 0;
   for (const Vector& vertex : motion.bodies[one].touching().vertices_m) {
     const Vector point = of_other.orientation.conjugate() *
                          (of_one.position_m + of_one.orientation * vertex - of_other.position_m);
-    if (bodies.surfaces[other]->box().exteriorDistance(point) > 0) continue;
-    const double far_m = bodies.surfaces[other]->box().diagonal().norm();
+    if (bodies.surfaces[other]->box().exteriorDistance(point) > rounding_m) continue;
+    const double far_m = bodies.surfaces[other]->box().diagonal().norm() + rounding_m;
     if (const auto at = bodies.surfaces[other]->Nearest(point, far_m)) {
-      depth_m = std::max(depth_m, -at->gap_m);
+      depth_m = std::max(depth_m, rounding_m - at->gap_m);
     }
   }
-  return depth_m + motion.bodies[one].rounding_m + motion.bodies[other].rounding_m;
+  return depth_m;
 }
 
 /// Says which bodies are deepest in each other in the frames around their blows.

@@ -9,8 +9,8 @@ namespace {
 
 /// In common engines, the jitter of resting contacts stays below the usual force times this factor.
 constexpr double kUsualFactor = 3;
-/// A flight has at least so many steps without contact, and takes so long: a hop of 1 mm. Resting
-/// contacts flicker for one or two steps, and in fine steps for more.
+/// A flight is at least three steps without contact, which take at least 30 ms, as a hop of 1 mm
+/// does. A resting contact flickers for one or two steps, or for more if they are shorter.
 constexpr size_t kFlightStepCount = 3;
 constexpr double kFlightS = 0.03;
 

@@ -35,8 +35,8 @@ struct CoarsenedSurface {
 /// A wrap gets edges as long as a surface of few triangles, so that a repaired body costs about as
 /// much as a sound one.
 ///
-/// Triangles so narrow that a mesh would divide them into six times as many as it needs get such
-/// edges, too.
+/// A given surface of narrow triangles gets such edges, too, if a mesh would divide it into six
+/// times the triangles that the mesh needs.
 ///
 /// Returns nothing if a given surface has at most kMaxUncoarsenedTriangles triangles, none of which
 /// is so narrow, or if no surface with two thirds of its triangles keeps these limits. `surface`

@@ -202,7 +202,7 @@ export function lowestHz(model: ModalModel, material: Material, size: number): n
 
 const NOTES = ['C', 'C#', 'D', 'D#', 'E', 'F', 'F#', 'G', 'G#', 'A', 'A#', 'B'];
 
-/** The frequency that 'A4', 'C#5' or '440' names, Hz. */
+/** The frequency that 'A4', 'Bb4', 'A4 +20' (cents) or '440 Hz' names, Hz. */
 export function hzOf(text: string): number | undefined {
   const [, letter, sign, octave, cents] = /^([A-G])(#|♯|b|♭)?(\d)(?:\s*([+−-]\s*\d+))?$/i.exec(text.trim()) ?? [];
   const semitones = letter ? NOTES.indexOf(letter.toUpperCase()) + (!sign ? 0 : /[#♯]/.test(sign) ? 1 : -1) + 12 * (Number(octave) + 1) - 69 : 0;

@@ -2,7 +2,7 @@
 import type { ListenNews } from './listen_worker';
 import { Ring } from './ring';
 
-/** Latencies to ask of the browser, s. 0 is its least, 11 ms in Chromium; on a busy machine that has gaps of its own. */
+/** Latencies to ask of the browser, s. 0 is its least, 11 ms in Chromium, at which a busy machine has gaps. */
 const LATENCIES_S = [0, 0.01, 0.02, 0.04];
 /** More gaps of the browser's own in this time ask for the next latency. */
 const WATCH_MS = 10000, MOST_GAPS = 1;

@@ -48,14 +48,14 @@ TEST_F(ReadElementsTest, LengthsAreInMetres) {
   }
 }
 
-// Vertices make no group of their own where the triangles beside them have the same number, because
-// meshers number corners so.
 TEST_F(ReadElementsTest, KeywordsOfMeditMayBeInLowerCase) {
   std::string text = ToMedit(Box(4));
   absl::AsciiStrToLower(&text);
   ExpectSame(ReadTetsOf(text, "mesh"), Box(4));
 }
 
+// Vertices make no group of their own where the triangles beside them have the same number, because
+// meshers number corners so.
 TEST_F(ReadElementsTest, ReferencesOfMeditAreGroups) {
   const absl::StatusOr<NamedMesh> read = ReadNamed(ToMedit(Box(4)), "mesh");
   ASSERT_TRUE(read.ok()) << read.status();
