@@ -6,15 +6,18 @@ import ipaddress
 import os
 import pathlib
 import re
+import sys
 
 SYSTEM_SOCKET = pathlib.Path("/run/carillon/carillond.sock")
 
 
 def default_server() -> str:
     """Returns $CARILLON_SERVER; otherwise the socket of the user's own daemon, or, where there is none, that of the
-    machine's daemon."""
+    machine's daemon. Windows has no such sockets: there a daemon in a container or a tunnel answers at loopback."""
     if named := os.environ.get("CARILLON_SERVER"):
         return named
+    if sys.platform == "win32":
+        return "127.0.0.1:50051"
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     folder = pathlib.Path(runtime, "carillon") if runtime else pathlib.Path(f"/tmp/carillon-{os.getuid()}")
     own = folder / "carillond.sock"
