@@ -22,6 +22,8 @@ constexpr double kLeastExplained = 2e-6;
 constexpr double kFaintShare = 0.2;
 /// Impulses are joined if the momentum of no node becomes less explained by more than this share.
 constexpr double kJoinedShare = 0.05;
+/// Blows of a pair that lie within so many bins cannot be told apart in time.
+constexpr size_t kBinsAtOnce = 2;
 
 /// A number from 1/2 to 2 for a candidate that does not depend on the order of candidates.
 double Varied(const Candidate& candidate, int variant) {
@@ -249,7 +251,33 @@ void ContactProblem::Solve(int variant) {
   balance_.Solve(kBiasedShare, kLeastExplained);
 }
 
+/// Returns the times of all blows, s. Blows of a pair that cannot be told apart in time have their
+/// mean time: if the corners of a face had times of their own, the face would land tilted.
+std::vector<double> ContactProblem::BlowTimes() const {
+  std::vector<double> times(candidates_.size(), 0);
+  for (size_t i = 0; i < candidates_.size(); ++i) times[i] = TimeOf(candidates_[i]);
+  for (const std::vector<size_t>& blows : blows_of_pair_) {
+    std::vector<size_t> found;
+    for (const size_t i : blows) {
+      if (!balance_.value(i).isZero(0)) found.push_back(i);
+    }
+    for (size_t first = 0, end = 0; first < found.size(); first = end) {
+      double sum = 0, moment = 0;
+      const size_t first_bin = BinOf(candidates_[found[first]]);
+      while (end < found.size() && BinOf(candidates_[found[end]]) <= first_bin + bins_) {
+        const double size = balance_.value(found[end]).norm();
+        sum += size;
+        moment += size * TimeOf(candidates_[found[end++]]);
+      }
+      if (BinOf(candidates_[found[end - 1]]) > first_bin + kBinsAtOnce) continue;
+      for (size_t i = first; i < end; ++i) times[found[i]] = moment / sum;
+    }
+  }
+  return times;
+}
+
 void ContactProblem::Tell(std::vector<BodyMotion>& motions) const {
+  const std::vector<double> times = BlowTimes();
   std::vector<std::vector<std::vector<BodyImpulse>>> impulses(
       motions.size(), std::vector<std::vector<BodyImpulse>>(frames_ - 1));
   std::vector<std::vector<Vector>> forces(motions.size(),
@@ -263,8 +291,10 @@ void ContactProblem::Tell(std::vector<BodyMotion>& motions) const {
       if (!balanced_[body]) continue;
       const Vector& arm = side > 0 ? c.arm_a : c.arm_b;
       if (c.blow()) {
-        impulses[body][c.frame].push_back(
-            {frame_s_ * c.bin / static_cast<double>(bins_), side * f, arm.cross(side * f)});
+        const size_t frame =
+            std::min(static_cast<size_t>(times[i] / frame_s_ + 1e-9), frames_ - 2);
+        const double since_s = std::max(0.0, times[i] - static_cast<double>(frame) * frame_s_);
+        impulses[body][frame].push_back({since_s, side * f, arm.cross(side * f)});
       } else {
         for (size_t k = c.frame; k <= c.last_frame; ++k) forces[body][k] += side * f;
       }

@@ -39,6 +39,7 @@ class ContactProblem {
   void AddUnknown(const Candidate& candidate);
   void AddJoints(const Motion& motion, const SearchBodies& bodies);
   size_t BinOf(const Candidate& candidate) const;
+  std::vector<double> BlowTimes() const;
   std::vector<Cluster> FindClusters() const;
   void AddMembers(uint32_t pair, double impulse, Cluster& cluster) const;
   void Join(Cluster& cluster);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace carillon::motion {
 namespace {
@@ -48,8 +49,9 @@ class PairReading {
 
   void Read(FoundContacts& found) {
     std::ranges::stable_sort(pieces_, {}, &Piece::time_s);
-    ReadBlows(found);
-    ReadLeaps(found);
+    ReadBlows();
+    ReadLeaps();
+    for (const std::vector<Piece>& blow : blows_) AddBlow(blow, found);
     for (const auto& [frame, piece] : loads_) AddLoad(frame, piece, found);
   }
 
@@ -70,7 +72,7 @@ class PairReading {
   }
 
   /// Takes pieces of one frame's time together, and keeps as loads those that are small.
-  void ReadBlows(FoundContacts& found) {
+  void ReadBlows() {
     for (size_t first = 0; first < pieces_.size();) {
       size_t end = first;
       double sum = 0;
@@ -81,7 +83,7 @@ class PairReading {
       const std::vector<Piece> blow(pieces_.begin() + static_cast<std::ptrdiff_t>(first),
                                     pieces_.begin() + static_cast<std::ptrdiff_t>(end));
       if (sum > Least(blow.front().candidate->frame, 0)) {
-        AddBlow(blow, found);
+        blows_.push_back(blow);
       } else {
         for (const Piece& piece : blow) {
           const auto frame = static_cast<size_t>(std::lround(piece.time_s / motion_.frame_s));
@@ -92,8 +94,9 @@ class PairReading {
     }
   }
 
-  /// Moves what is above the usual load, in one frame or two, into a blow.
-  void ReadLeaps(FoundContacts& found) {
+  /// Moves what is above the usual load, in one frame or two, into a blow: one within the time of
+  /// these loads, if there is one.
+  void ReadLeaps() {
     const std::vector<double> forces = forces_;
     std::vector<double> kept(forces.size(), 1);
     for (size_t k = 1; k + 1 < forces.size(); ++k) {
@@ -112,9 +115,31 @@ class PairReading {
                         piece.impulse * (1 - kept[frame]) * motion_.frame_s});
         piece.impulse *= kept[frame];
       }
-      if (!blow.empty()) AddBlow(blow, found);
+      if (!blow.empty()) Join(static_cast<double>(k - 1), static_cast<double>(end), blow);
       k = end;
     }
+  }
+
+  /// Adds the pieces of loads to the blow at their places between two frames or, if there is none,
+  /// as a blow.
+  void Join(double first_frame, double last_frame, std::vector<Piece>& pieces) {
+    for (std::vector<Piece>& blow : blows_) {
+      const auto is_of_blow = [&](const Piece& piece) {
+        return std::ranges::any_of(blow, [&](const Piece& of) { return AtOnePlace(of, piece); });
+      };
+      const double time_s = MeanTime(blow), frame = time_s / motion_.frame_s;
+      if (frame <= first_frame || frame >= last_frame) continue;
+      if (!std::ranges::all_of(pieces, is_of_blow)) continue;
+      for (Piece& piece : pieces) piece.time_s = time_s;
+      blow.insert(blow.end(), pieces.begin(), pieces.end());
+      return;
+    }
+    blows_.push_back(std::move(pieces));
+  }
+
+  bool AtOnePlace(const Piece& one, const Piece& other) const {
+    const ContactFeature &a = one.candidate->feature, &b = other.candidate->feature;
+    return a.key == b.key || (a.point_a - b.point_a).norm() < 3 * pair_.tolerance_m;
   }
 
   /// Adds a blow for each place: pieces at neighbouring places are one.
@@ -122,9 +147,7 @@ class PairReading {
     std::vector<std::vector<Piece>> places;
     for (const Piece& piece : pieces) {
       const auto near = [&](const std::vector<Piece>& place) {
-        const ContactFeature& f = place.front().candidate->feature;
-        return f.key == piece.candidate->feature.key ||
-               (f.point_a - piece.candidate->feature.point_a).norm() < 3 * pair_.tolerance_m;
+        return AtOnePlace(place.front(), piece);
       };
       const auto place = std::ranges::find_if(places, near);
       if (place == places.end())
@@ -196,6 +219,7 @@ class PairReading {
   const SearchBodies& bodies_;
   const BodyPair& pair_;
   std::vector<Piece> pieces_;
+  std::vector<std::vector<Piece>> blows_;  ///< pieces of one frame's time together
   std::vector<std::pair<size_t, Piece>> loads_;  ///< with forces instead of impulses
   std::vector<double> forces_;                   ///< the sum of the loads at each frame
 };

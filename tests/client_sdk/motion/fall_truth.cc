@@ -12,7 +12,7 @@ namespace carillon::motion {
 namespace {
 
 using Key = std::pair<uint32_t, uint32_t>;
-constexpr double kTogetherS = 0.008, kLeastShare = 0.03;
+constexpr double kTogetherS = 0.008, kLeastShare = 0.03, kLeastSpeed = 0.02;
 
 /// One step of one pair.
 struct StepImpulse {
@@ -142,9 +142,11 @@ class TruthReader {
                 std::vector<PairBlow>& blows) const {
     double last = -1, sum = 0, moment = 0;
     PairBlow blow{.a = key.first, .b = key.second};
-    const double least = 0.02 * ReducedMass(motion_, blow);
+    const double mass = ReducedMass(motion_, blow), least = mass * std::min(2 * 9.81 * step_s, kLeastSpeed);
+    // Soft contacts last for tens of milliseconds.
+    const auto around = static_cast<size_t>(0.06 / step_s);
     const auto close = [&] {
-      if (sum > 0) {
+      if (sum > kLeastSpeed * mass) {
         blow.time_s = moment / sum;
         blow.point_m /= sum;
         blows.push_back(blow);
@@ -154,7 +156,8 @@ class TruthReader {
     };
     for (size_t i = 0; i < series.size(); ++i) {
       std::vector<double> near;
-      for (size_t k = i > 24 ? i - 24 : 0; k < std::min(series.size(), i + 25); ++k) {
+      for (size_t k = i > around ? i - around : 0; k <= std::min(series.size() - 1, i + around);
+           ++k) {
         near.push_back(series[k].size);
       }
       std::ranges::nth_element(near, near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2));

@@ -91,6 +91,49 @@ TEST(FindContacts, TimesOneBounceWhereverItLiesInItsFrame) {
   }
 }
 
+/// A plate that falls flat for a time, and bounces off the floor with half of its speed.
+Motion FlatLanding(double frame_s, double fall_s) {
+  const falls::Vector sides = {0.2, 0.15, 0.01};
+  Motion motion;
+  motion.frame_s = frame_s;
+  MovingBody plate;
+  plate.name = "plate";
+  plate.surface = SurfaceOf(BoxOf(sides));
+  plate.mass_kg = 2;
+  const auto square = [&](size_t i) { return sides[i] * sides[i]; };
+  plate.inertia_kg_m2 = plate.mass_kg / 12 *
+                        Vector(square(1) + square(2), square(0) + square(2), square(0) + square(1))
+                            .asDiagonal();
+  const double speed = kGravity * fall_s;
+  for (double t = 0; t < fall_s + 0.15; t += frame_s) {
+    const double after = t - fall_s;
+    const double height = after < 0 ? kGravity * (fall_s * fall_s - t * t) / 2
+                                    : speed * after / 2 - kGravity * after * after / 2;
+    plate.poses.push_back({{0, 0, sides[2] / 2 + height}, Turn::Identity()});
+  }
+  motion.bodies = {Floor(), plate};
+  return motion;
+}
+
+TEST(FindContacts, TimesAFlatLandingWhereverItLiesInItsFrame) {
+  for (const double frame_s : {1 / 30.0, 1 / 60.0, 1 / 120.0}) {
+    for (const double share : {0.0, 0.1, 0.3, 0.41, 0.5, 0.62, 0.7, 0.82, 0.9, 0.97}) {
+      const double fall_s = frame_s * (std::round(0.2 / frame_s) + share);
+      const auto found = FindContacts(FlatLanding(frame_s, fall_s));
+      ASSERT_TRUE(found.ok()) << found.status();
+      double impulse = 0;
+      for (const FoundBlow& blow : found->blows) {
+        impulse -= blow.impulse_newton_seconds.z();
+        EXPECT_NEAR(static_cast<double>(blow.frame) * frame_s + blow.time_s, fall_s, 0.006 * frame_s)
+            << frame_s << " " << share;
+      }
+      EXPECT_EQ(found->blows.size(), 4U) << frame_s << " " << share;
+      EXPECT_NEAR(impulse, 2 * 1.5 * kGravity * fall_s, 6e-2) << frame_s << " " << share;
+      EXPECT_LT(found->confidence.unexplained, 3e-4) << frame_s << " " << share;
+    }
+  }
+}
+
 TEST(FindContacts, SaysHowDeepBodiesThatStrikeAreInsideOfEachOther) {
   Bounce bounce = OneBounce(1.0 / 60, 0.003);
   const auto good = FindContacts(bounce.motion);
