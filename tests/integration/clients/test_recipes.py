@@ -163,6 +163,33 @@ class RecipesTest(DaemonTest):
         rings = slice(480, -960)  # after the contact, and before the end fades out
         self.assertLess(numpy.std((made_pa - heard_pa)[rings]), 0.01 * numpy.std(heard_pa[rings]))
 
+    def test_room(self):
+        printed = self.run_python("recipe_room.md")
+        full_scale_pa = float(re.match(r"full scale: (\S+) Pa at 1 m, outside of the harmonics: -\d+ dB$", printed)[1])
+        channels = sound.read_wave(self.folder / "bar.wav").T * full_scale_pa
+        # The harmonics of the orders 0 to 3 in a direction of the plane y = 0, between the program's directions.
+        x, _, z = direction = (0.6, 0, 0.8)
+        harmonics = numpy.zeros(16)
+        harmonics[[0, 2, 3, 6, 7, 8]] = 1, z, x, (3 * z**2 - 1) / 2, 3**0.5 * x * z, 0.75**0.5 * x**2
+        harmonics[[12, 13]] = (5 * z**3 - 3 * z) / 2, (3 / 8)**0.5 * x * (5 * z**2 - 1)
+        harmonics[[14, 15]] = (15 / 4)**0.5 * x**2 * z, (5 / 8)**0.5 * x**3
+        with carillon.connect(self.daemon.server) as c:
+            (bar,) = (model for model in c.models() if model.material.preset == "brass")
+            with c.perform(step=0.02, microphones=[carillon.Omni(at=[100 * axis for axis in direction])],
+                           hearing={"directivity": True, "distance_gain": False}) as heard:
+                handle = heard.add(bar)
+                strike = carillon.Impacts([handle], [(0.1, 0.015, 0.008)], [(0, 0, -0.02)])
+                steps = [heard.step(impacts=strike if step == 5 else None)[0] for step in range(55)]
+        pressure_pa = numpy.concatenate(steps, axis=2)[0, 0, 5 * 960:]
+        difference_pa = harmonics @ channels - pressure_pa
+
+        def energy(pressures_pa, most_hz):
+            window = numpy.hanning(len(pressures_pa))
+            return (numpy.abs(numpy.fft.rfft(window * pressures_pa))[:most_hz]**2).sum()  # a line is a hertz
+
+        self.assertGreater(energy(pressure_pa, 2000), 1e-3 * energy(pressure_pa, 24000))
+        self.assertLess(energy(difference_pa, 2000), 1e-4 * energy(pressure_pa, 2000))
+
     def test_cracked_vase(self):
         printed = self.run_python("recipe_cracked_vase.md")
         figures = re.findall(r"(?m)^(\w+): \[ *([\d.]+).*\] Hz, T60 ([\d.]+) s$", printed)
