@@ -32,8 +32,11 @@ constexpr double kElse = 1e-3;
 constexpr double kLeastLoudness_db = 20;
 /// Strikes that are cut sooner than this have few lines because of that.
 constexpr double kLeastStrike_s = 0.2;
-/// Densities of solid bodies: from foams to osmium.
-constexpr double kLeastDensity = 5, kMostDensity = 25'000;
+/// Densities of solid bodies, from light foams to osmium: g/cm^3 in place of kg/m^3 are below.
+constexpr double kLeastDensity = 25, kMostDensity = 25'000;
+/// A law is none if its standard error, or the factor by which half of the rates are missed, is
+/// greater than these.
+constexpr double kMostLawError = 1, kMostMissed = 3;
 
 absl::Status TooFew(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TOO_FEW_MODES",
@@ -109,7 +112,7 @@ absl::Status Check(const std::vector<Match>& matches, size_t line_count, double 
   // The null hypothesis, by which no line is a mode of the body, is a rival, too.
   const double second = std::max(0.0, matches.size() > 1 ? matches[1].score : 0.0);
   const double odds = best.score - second;
-  if (odds < kLeastLogOdds) {
+  if (odds < kLeastLogOdds && second > 0) {
     return Refusal(
         absl::StatusCode::kInvalidArgument, "MATCH_AMBIGUOUS",
         absl::StrCat(
@@ -229,6 +232,12 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
     fit.laws = FitDamping(decays, settings.damping);
   }
   if (!fit.laws.empty()) ApplyLaw(decays, fit);
+  if (settings.damping == DampingKind::kAuto && !fit.laws.empty() &&
+      (fit.damping_error > kMostLawError || fit.laws[0].missed_by > kMostMissed)) {
+    fit.laws.clear();
+    fit.damping_error = 0;
+    for (FittedLine& line : fit.lines) line.law_per_s = line.law_error_per_s = 0;
+  }
   return fit;
 }
 

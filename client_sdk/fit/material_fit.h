@@ -55,10 +55,14 @@ struct MaterialFit {
   double log_odds = 0;
   std::vector<Match> candidates;  ///< of which the first was taken
   /// The laws that were tried, the one that was taken first. There is none if the kind of the law
-  /// is not given, and a room or noise hides the decays of most matched lines.
+  /// is not given, and a room or noise hides the decays of most matched lines, or no law explains
+  /// them.
   std::vector<DampingLaw> laws;
   /// Standard error of the law that was taken, relative: the median over the matched lines.
   double damping_error = 0;
+  /// By what factor the best law misses half of the rates if what the models radiate is not taken
+  /// off; zero: there is no law, or nothing is taken off.
+  double missed_without_air = 0;
   std::vector<FittedLine> lines;
   size_t matched_count = 0;
   size_t decay_count = 0;                       ///< matched lines whose decay is known

@@ -39,6 +39,8 @@ constexpr double kHum_per_s = 0.03;
 /// The part of a ring whose noise is compared with that before the blow, and the least fall of the
 /// noise, and number of bands with noise, that count.
 constexpr double kNoiseFrom_s = 0.1, kNoiseTo_s = 0.5, kLeastFall_db = 3;
+/// The quietest parts of even noise differ by less, dB.
+constexpr double kLeastGateFall_db = 12;
 constexpr size_t kLeastNoisy = 10;
 /// Decays this near to the room's are hard to tell from it.
 constexpr double kNearRoom = 0.3;
@@ -462,6 +464,9 @@ ExtractedModes ExtractModes(const std::vector<Ring>& rings, const Progress& prog
   }
   ExtractedModes extracted{.modes = WithoutSwarms(std::move(modes)), .room = {}};
   extracted.gain_fall_db = GainFallDb(bands);
+  if (const double fall_db = GateFallDb(rings); fall_db > kLeastGateFall_db) {
+    extracted.gain_fall_db = std::max(extracted.gain_fall_db, fall_db);
+  }
   TellRoomApart(bands, progress, extracted);
   std::ranges::sort(extracted.modes, {}, &MeasuredMode::frequency_hz);
   double strongest = 0;

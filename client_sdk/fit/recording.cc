@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "client_sdk/fit/statistics.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::fit {
@@ -23,6 +24,13 @@ constexpr double kPiece_s = 0.002;
 /// ms before it. Modes that beat rise more slowly.
 constexpr double kLeastPart = 0.03, kRise = 8;
 constexpr size_t kPiecesBefore = 10;
+/// Samples that are equal to the loudest, relative, and how many in a row a limit makes.
+constexpr double kEqual = 1e-4;
+constexpr size_t kRow = 2;
+constexpr double kLeastClipped_s = 1e-3;
+/// Length of the pieces whose noise is compared, and the time around a blow that is left out.
+constexpr double kNoise_s = 0.05, kGuard_s = 0.02;
+constexpr double kMostFall_db = 96;
 /// Length of the pieces whose loudness is compared.
 constexpr double kLoud_s = 0.02;
 
@@ -116,6 +124,46 @@ std::vector<Ring> FindRings(const std::vector<Recording>& recordings) {
     }
   }
   return rings;
+}
+
+double ClippedSeconds(const Recording& recording) {
+  size_t most = 0;
+  for (const std::vector<float>& samples : recording.channels) {
+    double peak = 0;
+    for (const float sample : samples) peak = std::max(peak, std::abs(double{sample}));
+    size_t clipped = 0, row = 0;
+    for (const float sample : samples) {
+      row = peak > 0 && std::abs(double{sample}) >= (1 - kEqual) * peak ? row + 1 : 0;
+      if (row >= kRow) clipped += row == kRow ? kRow : 1;
+    }
+    most = std::max(most, clipped);
+  }
+  const double seconds = static_cast<double>(most) / recording.sample_rate_hz;
+  return seconds < kLeastClipped_s ? 0 : seconds;
+}
+
+double GateFallDb(const std::vector<Ring>& rings) {
+  std::vector<double> falls_db;
+  for (const Ring& ring : rings) {
+    // Differences weaken the hum and the rumble of a room, which vary most.
+    std::vector<float> differences(ring.samples.size());
+    std::adjacent_difference(ring.samples.begin(), ring.samples.end(), differences.begin());
+    if (!differences.empty()) differences[0] = 0;
+    const auto piece = static_cast<size_t>(kNoise_s * ring.sample_rate_hz);
+    const auto guard = static_cast<size_t>(kGuard_s * ring.sample_rate_hz);
+    if (piece == 0 || ring.onset < 2 * piece + guard) continue;
+    const std::vector<double> energies = Energies(differences, piece);
+    const size_t before = (ring.onset - guard) / piece, after = (ring.onset + guard) / piece + 1;
+    if (after >= energies.size()) continue;
+    const double noise = *std::min_element(energies.begin() + 1,
+                                           energies.begin() + static_cast<std::ptrdiff_t>(before));
+    const double rest =
+        *std::min_element(energies.begin() + static_cast<std::ptrdiff_t>(after), energies.end());
+    if (noise > 0) {
+      falls_db.push_back(std::min(kMostFall_db, 10 * std::log10(noise / std::max(rest, 1e-30))));
+    }
+  }
+  return falls_db.empty() ? 0 : Median(std::move(falls_db));
 }
 
 double LoudnessDb(const std::vector<Ring>& rings) {

@@ -32,6 +32,14 @@ struct Ring {
 /// Finds the strikes in each channel. A strike ends where the next one begins, or after 3 s.
 std::vector<Ring> FindRings(const std::vector<Recording>& recordings);
 
+/// Returns how long a recording stands at the limits of its level, s; zero if it is not clipped.
+double ClippedSeconds(const Recording& recording);
+
+/// Returns by how much the quietest part after the blow is quieter than the quietest before it, dB,
+/// in the middle of all rings: more than noise alone varies only if a gate or a reduction of noise
+/// turned it down. Zero if no ring has noise before its blow.
+double GateFallDb(const std::vector<Ring>& rings);
+
 /// Returns by how much the sound just after a blow is louder than the quietest part of its ring,
 /// dB, for the loudest ring.
 double LoudnessDb(const std::vector<Ring>& rings);

@@ -219,13 +219,16 @@ class PairReading {
   const SearchBodies& bodies_;
   const BodyPair& pair_;
   std::vector<Piece> pieces_;
-  std::vector<std::vector<Piece>> blows_;  ///< pieces of one frame's time together
+  std::vector<std::vector<Piece>> blows_;        ///< pieces of one frame's time together
   std::vector<std::pair<size_t, Piece>> loads_;  ///< with forces instead of impulses
   std::vector<double> forces_;                   ///< the sum of the loads at each frame
 };
 
-Confidence ReadConfidence(const SearchBodies& bodies, const ContactProblem& problem,
-                          size_t frames) {
+Confidence ReadConfidence(const Motion& motion, const SearchBodies& bodies,
+                          const ContactProblem& problem) {
+  // In free flight there is no momentum to explain, but the rounding of the poses.
+  const double free_speed = 0.1 * motion.gravity_m_per_s2.norm() * motion.frame_s;
+  const size_t frames = motion.frame_count();
   Confidence confidence;
   double given = 0, residual = 0, worst = 0;
   for (size_t body = 0; body < bodies.motions.size(); ++body) {
@@ -239,6 +242,9 @@ Confidence ReadConfidence(const SearchBodies& bodies, const ContactProblem& prob
       confidence.worst_body = body;
       confidence.worst_frame = k;
     }
+    const double weighed =
+        static_cast<double>(frames) * bodies.motions[body].mass_kg() * free_speed * free_speed;
+    own_given = std::max(own_given, weighed);
     given += own_given;
     residual += own_residual;
     confidence.unexplained_of_body.push_back(own_given > 0 ? own_residual / own_given : 0);
@@ -266,7 +272,7 @@ FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
   };
   std::ranges::stable_sort(found.blows, {}, time);
   std::ranges::stable_sort(found.loads, {}, &FoundLoad::frame);
-  found.confidence = ReadConfidence(bodies, problem, motion.frame_count());
+  found.confidence = ReadConfidence(motion, bodies, problem);
   return found;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -129,10 +130,33 @@ std::string SizeCaution(const FitOptions& options) {
              : "one percent in size is two in E";
 }
 
+/// How well the material explains one of the bodies.
+struct Agreement {
+  size_t lines = 0, matched = 0;
+  double mean = 0, rms = 0;  ///< of the relative deviations of the lines from their modes
+};
+
+Agreement AgreementOf(const fit::MaterialFit& fit, size_t body) {
+  Agreement agreement;
+  for (const fit::FittedLine& line : fit.lines) {
+    if (line.body != body) continue;
+    ++agreement.lines;
+    if (!line.mode) continue;
+    const double deviation = std::log(line.measured.frequency_hz / line.model_hz);
+    ++agreement.matched;
+    agreement.mean += deviation, agreement.rms += deviation * deviation;
+  }
+  const auto matched = static_cast<double>(std::max<size_t>(1, agreement.matched));
+  agreement.mean /= matched;
+  agreement.rms = std::sqrt(agreement.rms / matched);
+  return agreement;
+}
+
 /// The named material nearest to the one that was found.
 struct Nearest {
   std::string name;
   double young_ratio = 1, density_ratio = 1;  ///< of the found one over that of the named one
+  double poisson_above = 0;                   ///< the found ratio less that of the named one
 };
 
 Nearest NearestOf(const fit::MaterialFit& fit) {
@@ -144,7 +168,10 @@ Nearest NearestOf(const fit::MaterialFit& fit) {
     const double distance = std::hypot(std::log(young), std::log(density));
     if (distance >= least) continue;
     least = distance;
-    nearest = {.name = named.name(), .young_ratio = young, .density_ratio = density};
+    nearest = {.name = named.name(),
+               .young_ratio = young,
+               .density_ratio = density,
+               .poisson_above = fit.poisson_ratio - named.material().poisson_ratio()};
   }
   return nearest;
 }
@@ -165,22 +192,84 @@ std::string FarCaution(const Nearest& nearest) {
       nearest.name, 1 / speed_squared, 1 / nearest.density_ratio);
 }
 
+/// Says so if Poisson's ratio is unlike that of the nearest named material, which wrong proportions
+/// of the mesh make it.
+std::string ProportionCaution(const fit::MaterialFit& fit, const Nearest& nearest) {
+  constexpr double kFar = 0.04;
+  if (std::abs(nearest.poisson_above) < kFar + 2 * fit.poisson_error) return "";
+  return absl::StrFormat(
+      "Poisson's ratio is %.3f, and %.3f that of %s, the nearest named material: see the "
+      "proportions of the mesh, of which one percent can change it by 0.02.",
+      fit.poisson_ratio, fit.poisson_ratio - nearest.poisson_above, nearest.name);
+}
+
 /// Says so if the level of the recordings was changed while they were made.
 std::string GainCaution(const Extracted& extracted) {
   if (extracted.gain_fall_db == 0) return "";
   return absl::StrFormat(
       "The noise is %.0f dB quieter after the blows than before them. Unless another sound ended "
-      "there, an automatic gain control changed the level, and the decays are not the body's: "
-      "switch "
-      "it off, and record again. The frequencies do not suffer.",
+      "there, an automatic gain control, a gate or a reduction of noise changed the level, and the "
+      "decays are not the body's: switch it off, and record again. The frequencies do not suffer.",
       extracted.gain_fall_db);
+}
+
+/// Says so if a recording is clipped.
+std::string ClippedCaution(const Extracted& extracted) {
+  if (extracted.clipped.empty()) return "";
+  return absl::StrFormat(
+      "%s stands at its greatest level for %.2g ms in all: it is clipped, which adds lines that no "
+      "mode "
+      "has. Record again with a lower level, or farther away.",
+      extracted.clipped, 1000 * extracted.clipped_s);
+}
+
+/// Says so if the computed radiation makes the decays less like those of the recordings.
+std::string AirCaution(const fit::MaterialFit& fit) {
+  constexpr double kWorse = 1.05;
+  if (fit.laws.empty() || fit.missed_without_air == 0 ||
+      fit.laws[0].missed_by < kWorse * fit.missed_without_air) {
+    return "";
+  }
+  return absl::StrFormat(
+      "Without what the model radiates the law would miss the rates by x%.2f, with it by x%.2f: "
+      "see that the mesh has the size of the body, and that nothing else changed the decays.",
+      fit.missed_without_air, fit.laws[0].missed_by);
+}
+
+/// Says so if one of several bodies agrees worse than the others.
+std::string AgreementCaution(const fit::MaterialFit& fit, const std::vector<Source>& sources,
+                             size_t body) {
+  constexpr double kWorse = 2, kLeastMatched = 0.35;
+  double least = HUGE_VAL;
+  for (size_t b = 0; b < sources.size(); ++b) least = std::min(least, AgreementOf(fit, b).rms);
+  const Agreement own = AgreementOf(fit, body);
+  const bool few =
+      static_cast<double>(own.matched) < kLeastMatched * static_cast<double>(own.lines);
+  if (sources.size() == 1 || (own.rms <= kWorse * least && !few)) return "";
+  return absl::StrFormat(
+      "%s agrees worse than the other bodies, by %d of %s, %.2g %% apart: see its size, and that "
+      "its recordings and its material are its own.",
+      sources[body].body.name, own.matched, Counted(own.lines, "line"), 100 * own.rms);
+}
+
+/// What to be cautious about in the recordings of a body.
+std::vector<std::string> CautionsOf(const Source& source) {
+  std::vector<std::string> cautions = {GainCaution(source.extracted),
+                                       ClippedCaution(source.extracted)};
+  std::erase(cautions, "");
+  return cautions;
 }
 
 /// What to be cautious about, one sentence or more in each.
 std::vector<std::string> CautionsOf(const fit::MaterialFit& fit,
                                     const std::vector<Source>& sources) {
-  std::vector<std::string> cautions = {FarCaution(NearestOf(fit))};
-  for (const Source& source : sources) cautions.push_back(GainCaution(source.extracted));
+  const Nearest nearest = NearestOf(fit);
+  std::vector<std::string> cautions = {FarCaution(nearest), ProportionCaution(fit, nearest),
+                                       AirCaution(fit)};
+  for (size_t b = 0; b < sources.size(); ++b) {
+    cautions.push_back(AgreementCaution(fit, sources, b));
+    std::ranges::copy(CautionsOf(sources[b]), std::back_inserter(cautions));
+  }
   std::erase(cautions, "");
   return cautions;
 }
@@ -196,15 +285,15 @@ std::string MaterialFileText(const fit::MaterialFit& fit, const std::vector<Sour
                         "# E/rho %.5g m^2/s^2 +- %.2g %%, Poisson's ratio +- %.2g (two standard "
                         "errors); %d lines matched, %.2g %% apart,\n"
                         "# the next best match %.1f nepers behind. A wrong size of the mesh hides "
-                        "in E: %s.\n",
+                        "in E: %s; wrong proportions hide in Poisson's ratio.\n",
                         fit.young_over_density, 200 * fit.young_over_density_error,
                         2 * fit.poisson_error, fit.matched_count, 100 * fit.rms, fit.log_odds,
                         SizeCaution(options));
   if (fit.laws.empty()) {
     absl::StrAppendFormat(
         &text,
-        "# The decays of only %d of the matched lines are known, so that no "
-        "damping was found: fit again with --damping, or give --loss-factor beside this file.\n",
+        "# The decays of %d of the matched lines are known, and no damping was found: fit again "
+        "with --damping, or give --loss-factor beside this file.\n",
         fit.decay_count);
   } else {
     absl::StrAppendFormat(&text,
@@ -249,28 +338,6 @@ Json ToJson(const fit::FittedLine& line, const std::vector<Source>& sources) {
   json["law_per_s"] = line.law_per_s;
   json["law_error_per_s"] = line.law_error_per_s;
   return json;
-}
-
-/// How well the material explains one of the bodies.
-struct Agreement {
-  size_t lines = 0, matched = 0;
-  double mean = 0, rms = 0;  ///< of the relative deviations of the lines from their modes
-};
-
-Agreement AgreementOf(const fit::MaterialFit& fit, size_t body) {
-  Agreement agreement;
-  for (const fit::FittedLine& line : fit.lines) {
-    if (line.body != body) continue;
-    ++agreement.lines;
-    if (!line.mode) continue;
-    const double deviation = std::log(line.measured.frequency_hz / line.model_hz);
-    ++agreement.matched;
-    agreement.mean += deviation, agreement.rms += deviation * deviation;
-  }
-  const auto matched = static_cast<double>(std::max<size_t>(1, agreement.matched));
-  agreement.mean /= matched;
-  agreement.rms = std::sqrt(agreement.rms / matched);
-  return agreement;
 }
 
 /// The frequencies of all modes of a body, with the material that was found.
@@ -371,8 +438,9 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
   absl::PrintF("E           %.5g GPa at %.5g kg/m^3\n", fit.young_pa / 1e9, fit.density_kg_per_m3);
   absl::PrintF("Poisson     %.4f +- %.4f\n", fit.poisson_ratio, 2 * fit.poisson_error);
   const Nearest nearest = NearestOf(fit);
-  absl::PrintF("nearest     %s: E %+.2g %%, density %+.2g %%\n", nearest.name,
-               100 * (nearest.young_ratio - 1), 100 * (nearest.density_ratio - 1));
+  absl::PrintF("nearest     %s: E %+.2g %%, density %+.2g %%, Poisson %+.3f\n", nearest.name,
+               100 * (nearest.young_ratio - 1), 100 * (nearest.density_ratio - 1),
+               nearest.poisson_above);
   for (size_t b = 0; sources.size() > 1 && b < sources.size(); ++b) {
     const Agreement agreement = AgreementOf(fit, b);
     absl::PrintF("%-11s %d of %s matched, %.2g %% apart, %+.2g %% on the average\n",
@@ -381,9 +449,9 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
   }
   if (fit.laws.empty()) {
     absl::PrintF(
-        "damping     not found: the decays of only %d of %s are known, and the others are hidden "
-        "by the room or the noise, or not in the table; record nearer and where there is less "
-        "echo, or name the law (--damping)\n",
+        "damping     not found: the decays of %d of %s are known, and the others are hidden by the "
+        "room or the noise, or not in the table, or no law explains them; record nearer and where "
+        "there is less echo, or name the law (--damping)\n",
         fit.decay_count, Counted(fit.matched_count, "matched line"));
   }
   for (size_t k = 0; k < fit.laws.size(); ++k) {
@@ -413,8 +481,10 @@ void PrintFit(const fit::MaterialFit& fit, const std::vector<Source>& sources,
     if (!source.extracted.rings.empty()) PrintRoom(source.extracted.room);
   }
   PrintLines(fit, sources);
-  absl::PrintF("\nA wrong size of the mesh hides in E and cannot be seen: %s.\n",
-               SizeCaution(options));
+  absl::PrintF(
+      "\nA wrong size of the mesh hides in E and cannot be seen: %s. Wrong proportions hide in "
+      "Poisson's ratio: one percent in the width of a bar is 0.02.\n",
+      SizeCaution(options));
   for (const std::string& caution : CautionsOf(fit, sources)) absl::PrintF("%s\n", caution);
 }
 
@@ -452,13 +522,15 @@ absl::Status ExtractModesOf(const ExtractOptions& options, bool json) {
     absl::PrintF("%s\n", Json{{"strikes", extracted.rings.size()},
                               {"room_t60_s", RoomT60(extracted.room)},
                               {"gain_fall_db", extracted.gain_fall_db},
+                              {"clipped_s", extracted.clipped_s},
                               {"modes", modes}}
                              .dump());
   } else {
     PrintModes(extracted.modes);
     PrintRoom(extracted.room);
-    const std::string caution = GainCaution(extracted);
-    if (!caution.empty()) absl::PrintF("%s\n", caution);
+    for (const std::string& caution : {GainCaution(extracted), ClippedCaution(extracted)}) {
+      if (!caution.empty()) absl::PrintF("%s\n", caution);
+    }
   }
   return absl::OkStatus();
 }
@@ -486,7 +558,17 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
     for (const Source& source : sources) fitted_bodies.push_back(source.body);
     return fit::FitMaterial(fitted_bodies, options.settings);
   };
-  ASSIGN_OR_RETURN(fit::MaterialFit fit, fitted());
+  absl::StatusOr<fit::MaterialFit> first = fitted();
+  if (!first.ok()) {
+    for (const Source& source : sources) {
+      for (const std::string& caution : CautionsOf(source)) {
+        absl::FPrintF(stderr, "warning: %s\n", caution);
+      }
+    }
+    return first.status();
+  }
+  fit::MaterialFit fit = *std::move(first);
+  const double missed_without_air = fit.laws.empty() ? 0 : fit.laws[0].missed_by;
   // What each mode radiates is known once the speed of sound is.
   for (size_t b = 0; b < sources.size(); ++b) {
     sources[b].body.radiation = RadiationOf(models[b], std::sqrt(fit.young_over_density));
@@ -495,6 +577,9 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
     }
   }
   ASSIGN_OR_RETURN(fit, fitted());
+  const bool has_air =
+      std::ranges::any_of(sources, [](const Source& source) { return source.no_air.empty(); });
+  if (has_air) fit.missed_without_air = missed_without_air;
   if (!options.out.empty())
     RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources, options)));
   std::vector<fit::ResidualShare> rest;

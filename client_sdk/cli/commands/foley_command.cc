@@ -44,9 +44,14 @@ void List(const FoleyScene& foley) {
     const MovingBody& body = motion.bodies[i];
     const FoleyBody& sounds = foley.bodies[i];
     const char* moves = body.poses.size() == 1 ? "fixed" : body.mass_kg > 0 ? "free" : "driven";
-    absl::PrintF("%-20s  %-6s  %-16s  %10.4g kg  %6d triangles, %s%s\n", EscapedText(body.name),
-                 moves, sounds.material.empty() ? "silent" : sounds.material, body.mass_kg,
-                 body.surface.triangles.size(), sounds.closed ? "closed" : "open",
+    Eigen::AlignedBox3d box;
+    for (const motion::Vector& vertex : body.surface.vertices_m) box.extend(vertex);
+    const motion::Vector sides_m = box.sizes();
+    absl::PrintF("%-20s  %-6s  %-16s  %10.4g kg  %.3g x %.3g x %.3g m  %6d triangles, %s%s\n",
+                 EscapedText(body.name), moves,
+                 sounds.material.empty() ? "silent" : sounds.material, body.mass_kg, sides_m.x(),
+                 sides_m.y(), sides_m.z(), body.surface.triangles.size(),
+                 sounds.closed ? "closed" : "open",
                  foley.scene.bodies[i].material.empty()
                      ? ""
                      : absl::StrCat(", of \"", EscapedText(foley.scene.bodies[i].material), "\""));
@@ -105,7 +110,13 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
                   "there are less sure\n",
                   100 * is.unexplained, EscapedText(where));
   }
-  if (is.unexplained <= kWrong || force) return absl::OkStatus();
+  if (force) return absl::OkStatus();
+  if (is.unexplained <= kWrong) {
+    if (!found.blows.empty() || !found.loads.empty()) return absl::OkStatus();
+    return Refusal(absl::StatusCode::kInvalidArgument, "MOTION_WITHOUT_CONTACT",
+                   "no body touches another, so there is nothing to hear: is a floor missing or "
+                   "at the wrong height (--floor), or the unit (--unit) wrong?");
+  }
   if (is.nearest_gap_m > 0.05 * is.worst_radius_m) {
     const std::string nearest =
         motion.bodies.size() == 1

@@ -18,14 +18,17 @@ struct Extracted {
   std::vector<fit::MeasuredMode> modes;
   fit::Room room;
   double gain_fall_db = 0;
+  std::string clipped;   ///< the file that is clipped the longest; empty: none
+  double clipped_s = 0;  ///< how long
 };
 
 /// Reads recordings and finds the modes. Shows the progress on a terminal. Errors: those of
 /// ReadRecording.
 absl::StatusOr<Extracted> ExtractFrom(const std::vector<std::string>& paths);
 
-/// Reads modes from a CSV file: frequency_hz and, if they are known, frequency_error_hz,
-/// decay_per_s and decay_error_per_s in each line. Lines that begin with no figure are passed over.
+/// Reads modes from a CSV file: frequencies alone, or columns that the first line names:
+/// frequency_hz and, if they are known, frequency_error_hz, decay_per_s or t60_s, and
+/// decay_error_per_s. The columns that WriteModes writes besides are passed over.
 /// Errors: InvalidArgument (RECORDING_UNREADABLE), NotFound (FILE_NOT_FOUND).
 absl::StatusOr<std::vector<fit::MeasuredMode>> ReadModes(const std::string& path);
 

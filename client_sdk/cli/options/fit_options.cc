@@ -34,7 +34,7 @@ CLI::Validator YoungRange(fit::FitSettings& settings) {
         double low = 0, high = 0;
         const bool read =
             colon != std::string::npos && CLI::detail::lexical_cast(text.substr(0, colon), low) &&
-            CLI::detail::lexical_cast(text.substr(colon + 1), high) && low > 0 && high > low;
+            CLI::detail::lexical_cast(text.substr(colon + 1), high) && low >= 1e5 && high > low;
         if (!read) return text + " is not two moduli LO:HI in Pa, such as 60e9:80e9";
         settings.least_young_pa = low;
         settings.most_young_pa = high;

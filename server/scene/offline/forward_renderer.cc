@@ -96,7 +96,7 @@ ForwardRenderer::ForwardRenderer(const OfflineSettings& settings, BodyCache& bod
       transfers_(transfers),
       threads_(settings.thread_count),
       mixer_(SettingsOf(settings, threads_)),
-      scene_("the trace", settings.space),
+      scene_(settings.is_observation ? "the environment" : "the trace", settings.space),
       target_(settings.mapping.first_frame),
       intake_(scene_, target_, IntakeSettingsOf(settings, blows_)) {}
 

@@ -142,7 +142,8 @@ class TruthReader {
                 std::vector<PairBlow>& blows) const {
     double last = -1, sum = 0, moment = 0;
     PairBlow blow{.a = key.first, .b = key.second};
-    const double mass = ReducedMass(motion_, blow), least = mass * std::min(2 * 9.81 * step_s, kLeastSpeed);
+    const double mass = ReducedMass(motion_, blow),
+                 least = mass * std::min(2 * 9.81 * step_s, kLeastSpeed);
     // Soft contacts last for tens of milliseconds.
     const auto around = static_cast<size_t>(0.06 / step_s);
     const auto close = [&] {

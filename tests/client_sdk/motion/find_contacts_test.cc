@@ -101,9 +101,9 @@ Motion FlatLanding(double frame_s, double fall_s) {
   plate.surface = SurfaceOf(BoxOf(sides));
   plate.mass_kg = 2;
   const auto square = [&](size_t i) { return sides[i] * sides[i]; };
-  plate.inertia_kg_m2 = plate.mass_kg / 12 *
-                        Vector(square(1) + square(2), square(0) + square(2), square(0) + square(1))
-                            .asDiagonal();
+  plate.inertia_kg_m2 =
+      plate.mass_kg / 12 *
+      Vector(square(1) + square(2), square(0) + square(2), square(0) + square(1)).asDiagonal();
   const double speed = kGravity * fall_s;
   for (double t = 0; t < fall_s + 0.15; t += frame_s) {
     const double after = t - fall_s;
@@ -124,7 +124,8 @@ TEST(FindContacts, TimesAFlatLandingWhereverItLiesInItsFrame) {
       double impulse = 0;
       for (const FoundBlow& blow : found->blows) {
         impulse -= blow.impulse_newton_seconds.z();
-        EXPECT_NEAR(static_cast<double>(blow.frame) * frame_s + blow.time_s, fall_s, 0.006 * frame_s)
+        EXPECT_NEAR(static_cast<double>(blow.frame) * frame_s + blow.time_s, fall_s,
+                    0.006 * frame_s)
             << frame_s << " " << share;
       }
       EXPECT_EQ(found->blows.size(), 4U) << frame_s << " " << share;

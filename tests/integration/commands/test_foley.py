@@ -3,6 +3,7 @@
 from a glTF; what is no motion, or not explained by contacts, is refused by name."""
 
 import json
+import re
 import struct
 import unittest
 
@@ -273,8 +274,8 @@ class FoleyTest(DaemonTest):
 
     def test_list_shows_bodies_and_cameras(self):
         lines = self.foley("fall.glb", "--list").stdout
-        for pattern in (r"Bar +free +structural_steel +0\.314 kg +12 triangles, closed", r"Ground +fixed +silent",
-                        r"Camera +camera"):
+        for pattern in (r"Bar +free +structural_steel +0\.314 kg +0\.2 x 0\.02 x 0\.01 m +12 triangles, closed",
+                        r"Ground +fixed +silent", r"Camera +camera"):
             self.assertRegex(lines, pattern)
 
     def refused(self, reason, done):
@@ -284,6 +285,12 @@ class FoleyTest(DaemonTest):
     def test_refusals_have_names(self):
         out = ("--trace", self.folder / "none.contacts")
         self.refused("MOTION_WITHOUT_CONTACT", self.table("fall.csv", *out, check=False))
+        flight = [(k / 60, k / 90, 2 + k / 20 - 4.905 * (k / 60)**2) for k in range(30)]
+        rows = "".join(f"{time:.9g},Bar,{x:.9g},0,{z:.9g},1,0,0,0\n" for time, x, z in flight)
+        (self.folder / "flight.csv").write_text(rows)
+        flight = self.table("flight.csv", "--floor", 0, *out, check=False)
+        self.refused("MOTION_WITHOUT_CONTACT", flight)
+        self.assertLess(float(re.search(r"unexplained (\S+) %", flight.stderr)[1]), 0.1)
         rows = "".join(f"{k / 60},Bar,{max(0, k - 20) * 0.05},0,{SIDES_M[2] / 2},1,0,0,0\n" for k in range(40))
         (self.folder / "pushed.csv").write_text(rows)  # by a hand that the file does not have
         self.refused("MOTION_UNEXPLAINED", self.table("pushed.csv", "--floor", 0, *out, check=False))

@@ -51,12 +51,14 @@ class Line:
 @dataclasses.dataclass(frozen=True)
 class Extraction:
     """The lines of recorded strikes. `room_t60_s` is None where no room was told apart. `gain_fall_db` is by how much
-    an automatic gain control turned the level down at the blows, as the noise tells, or zero; it changes the decays."""
+    an automatic gain control, a gate or a reduction of noise turned the level down at the blows, as the noise tells, or
+    zero; it changes the decays. `clipped_s` is how long the recording that is clipped most is so, or zero."""
 
     lines: list[Line]
     strike_count: int
     room_t60_s: Optional[float]
     gain_fall_db: float = 0
+    clipped_s: float = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +92,11 @@ class Fit:
     residual_shares: list[tuple[float, float, float]]
     recordings: dict[str, list[Path]]
 
+    def __repr__(self) -> str:
+        return (f"Fit({self.nearest_material}?: E {self.young_pa / 1e9:.4g} GPa, Poisson's ratio "
+                f"{self.poisson_ratio:.3f}, {self.density_kg_per_m3:.4g} kg/m^3, {self.matched} of {len(self.lines)} "
+                f"lines matched, {100 * self.rms:.2g} % apart)")
+
     def plot(self, body: Optional[str] = None, axes: Any = None) -> Any:
         """Draws, for the first body or the one named, the spectrum of its recordings with the lines and the modes of
         the model, matched and unmatched, and below it decay over frequency with the law; needs matplotlib. `axes` are
@@ -98,25 +105,27 @@ class Fit:
         return plots.plot_fit(self, next(iter(self.modes_hz)) if body is None else body, axes)
 
 
-def extract(recordings: Iterable[Path], *, program: str = "carillon") -> Extraction:
+def extract(recordings: Union[Path, Iterable[Path]], *, program: str = "carillon") -> Extraction:
     """Lists the frequencies and the decays of recorded strikes on one body. Raises CarillonError, with the reasons of
     proto/errors.md, such as TOO_FEW_MODES."""
-    found = json.loads(programs.run(program, None, "--json", "material", "extract", *recordings).stdout)
+    found = json.loads(programs.run(program, None, "--json", "material", "extract", *_files(recordings)).stdout)
     return Extraction([Line(**mode) for mode in found["modes"]], found["strikes"], found["room_t60_s"],
-                      found["gain_fall_db"])
+                      found["gain_fall_db"], found["clipped_s"])
 
 
-def material(model: Body, recordings: Iterable[Path], *, mass: Optional[float] = None,
+def material(model: Body, recordings: Union[Path, Iterable[Path]], *, mass: Optional[float] = None,
              density: Optional[float] = None, poisson: Optional[float] = None,
              young_range: Optional[tuple[float, float]] = None,
              damping: Literal["auto", "eta", "table", "rayleigh"] = "auto",
-             others: Optional[Mapping[Body, Iterable[Path]]] = None, server: Optional[str] = None,
+             others: Optional[Mapping[Body, Union[Path, Iterable[Path]]]] = None, server: Optional[str] = None,
              program: str = "carillon") -> Fit:
     """Finds the material of a body whose model the daemon at `server` has, from recorded strikes, or from tables of
     modes measured elsewhere (.csv). `mass` in kg or `density` in kg/m^3 must be given; `poisson` and `young_range`, Pa,
     if they are known. `others` are further bodies of the same material, with their recordings. Raises CarillonError,
     with the reasons of proto/errors.md, such as MATCH_AMBIGUOUS."""
-    bodies = {_name(body): list(files) for body, files in {model: recordings, **(others or {})}.items()}
+    if mass is not None and density is not None:
+        raise ValueError("mass and density exclude each other: the mass gives the density by the model's volume")
+    bodies = {_name(body): _files(files) for body, files in {model: recordings, **(others or {})}.items()}
     first, *rest = bodies
     words: list[Any] = [first, *bodies[first]]
     for name in rest:
@@ -137,6 +146,10 @@ def material(model: Body, recordings: Iterable[Path], *, mass: Optional[float] =
                lines=[Line(**line) for line in found["lines"]],
                modes_hz={body["name"]: body["modes_hz"] for body in found["bodies"]}, residual=residual,
                residual_shares=shares, recordings=bodies)
+
+
+def _files(recordings: Union[Path, Iterable[Path]]) -> list[Path]:
+    return [recordings] if isinstance(recordings, (str, os.PathLike)) else list(recordings)
 
 
 def _name(body: Body) -> str:
