@@ -34,9 +34,8 @@ constexpr double kLeastLoudness_db = 20;
 constexpr double kLeastStrike_s = 0.2;
 /// Densities of solid bodies, from light foams to osmium: g/cm^3 in place of kg/m^3 are below.
 constexpr double kLeastDensity = 25, kMostDensity = 25'000;
-/// A law is none if its standard error, or the factor by which half of the rates are missed, is
-/// greater than these.
-constexpr double kMostLawError = 1, kMostMissed = 3;
+/// A law that misses half of the decay rates by a greater factor is none.
+constexpr double kMostMissed = 3;
 
 absl::Status TooFew(absl::string_view what) {
   return Refusal(absl::StatusCode::kInvalidArgument, "TOO_FEW_MODES",
@@ -233,7 +232,7 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
   }
   if (!fit.laws.empty()) ApplyLaw(decays, fit);
   if (settings.damping == DampingKind::kAuto && !fit.laws.empty() &&
-      (fit.damping_error > kMostLawError || fit.laws[0].missed_by > kMostMissed)) {
+      fit.laws[0].missed_by > kMostMissed) {
     fit.laws.clear();
     fit.damping_error = 0;
     for (FittedLine& line : fit.lines) line.law_per_s = line.law_error_per_s = 0;

@@ -28,6 +28,7 @@ ROLES = ("listen", "strike", "submit", "administer")
 CONTRACT = (admin_service_pb2, audio_service_pb2, contact_service_pb2, decomposition_service_pb2,
             modal_model_service_pb2, scene_service_pb2, server_service_pb2)
 TIMES = 100
+CREATE = "/carillon.v1.SceneService/CreateScene"
 REFUSED = (grpc.StatusCode.UNAUTHENTICATED, grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.RESOURCE_EXHAUSTED)
 
 
@@ -114,10 +115,18 @@ class AccessTest(unittest.TestCase):
         except grpc.RpcError as error:
             return error.code(), error.details().split(":")[0]
 
-    def logged(self, pattern):
+    def outcome_without_tls(self):
+        with grpc.insecure_channel(self.address, [("grpc.use_local_subchannel_pool", 1)]) as channel:
+            return self.outcome(channel, CREATE, token_of("strike"))
+
+    def outcome_with(self, files):
+        with self.channel(*files) as channel:
+            return self.outcome(channel, CREATE, token_of("strike"))
+
+    def logged(self, pattern, subject="refused access"):
         """How many lines of the log match, with those that were counted instead."""
         log = (self.folder / "log").read_text()
-        counted = re.findall(r"(\d+) more lines about (?:refused access|gRPC)", log)
+        counted = re.findall(rf"(\d+) more lines about {subject}", log)
         return len(re.findall(pattern, log)) + sum(map(int, counted))
 
     def test_every_method_needs_the_role_that_the_page_names(self):
@@ -149,7 +158,8 @@ class AccessTest(unittest.TestCase):
     def test_a_hundred_attempts_of_each_kind_let_nobody_in_and_are_logged(self):
         self.serve()
         self.attempts = 0
-        create, delete = (f"/carillon.v1.SceneService/{name}" for name in ("CreateScene", "DeleteScene"))
+        foreign = Authority(self.folder, "foreign").issue("strike")
+        create, delete = CREATE, "/carillon.v1.SceneService/DeleteScene"
         with self.channel() as channel:
             scenes = scene_service_pb2_grpc.SceneServiceStub(channel)
             scene = scenes.CreateScene(scene_service_pb2.CreateSceneRequest(),
@@ -163,6 +173,8 @@ class AccessTest(unittest.TestCase):
             other = token_of("other")
             self.attack("another's scene", TIMES, lambda: self.outcome(channel, delete, other, remove))
             self.attack("contacts in another's scene", TIMES, lambda: self.outcome(channel, contacts, other, start))
+            self.attack("without TLS", 0, self.outcome_without_tls)
+            self.attack("a certificate of another authority", 0, lambda: self.outcome_with(foreign))
             self.attack("wrong token", TIMES, lambda: self.outcome(channel, create, "guess"))
             self.assertEqual(self.outcome(channel, delete, token_of("strike"), remove)[0], grpc.StatusCode.OK)
         self.daemon.stop()
