@@ -218,8 +218,7 @@ std::string ClippedCaution(const Extracted& extracted) {
   if (extracted.clipped.empty()) return "";
   return absl::StrFormat(
       "%s stands at its greatest level for %.2g ms in all: it is clipped, which adds lines that no "
-      "mode "
-      "has. Record again with a lower level, or farther away.",
+      "mode has. Record again with a lower level, or farther away.",
       extracted.clipped, 1000 * extracted.clipped_s);
 }
 
