@@ -12,6 +12,8 @@ namespace {
 constexpr double kShareOfLoad = 0.6;
 /// and changes the relative velocity of the bodies by at least this, m/s.
 constexpr double kLeastSpeed = 0.02;
+/// Impulses that can be divided more evenly by less than this part stay as they are.
+constexpr double kLeastEven = 0.05;
 
 /// An impulse at a point, at a time since the first frame.
 struct Piece {
@@ -158,9 +160,74 @@ class PairReading {
     // Places that cannot be told apart in time have one time.
     const auto [first, last] = std::ranges::minmax(pieces, {}, &Piece::time_s);
     const bool at_once = last.time_s - first.time_s < 2.5 * bin_s_;
+    if (at_once) Even(places);
     for (const std::vector<Piece>& place : places) {
       AddPlace(place, at_once ? MeanTime(pieces) : MeanTime(place), found);
     }
+  }
+
+  /// Divides impulses that act at once as evenly as their sum, their torque and friction allow: the
+  /// balance leaves it open how the corners of a face share a blow, and pushes them apart.
+  void Even(std::vector<std::vector<Piece>>& places) const {
+    const bool of_a = bodies_.motions[pair_.a].balanced();
+    Eigen::Matrix<double, 6, 6> sums = Eigen::Matrix<double, 6, 6>::Zero();
+    Eigen::Matrix<double, 6, 1> whole = Eigen::Matrix<double, 6, 1>::Zero();
+    std::vector<std::pair<Vector, Vector>> given;  // the impulse and the arm of each place
+    for (const std::vector<Piece>& place : places) {
+      Vector impulse = Vector::Zero(), arm = Vector::Zero();
+      double size = 0;
+      for (const Piece& piece : place) {
+        const double own = piece.impulse.norm();
+        impulse += piece.impulse;
+        arm += own * (of_a ? piece.candidate->arm_a : piece.candidate->arm_b);
+        size += own;
+      }
+      arm /= std::max(size, 1e-300);
+      Eigen::Matrix<double, 6, 3> acts;
+      acts << Matrix::Identity(), Cross(arm);
+      sums += acts * acts.transpose();
+      whole += acts * impulse;
+      given.emplace_back(impulse, arm);
+    }
+    const Eigen::Matrix<double, 6, 1> even = sums.completeOrthogonalDecomposition().solve(whole);
+    const auto share = [&](size_t place, double part) {
+      const auto& [impulse, arm] = given[place];
+      const Vector least = even.head<3>() - arm.cross(Vector(even.tail<3>()));
+      return Vector(impulse + part * (least - impulse));
+    };
+    const auto may_be = [&](double part) {
+      for (size_t i = 0; i < places.size(); ++i) {
+        Vector normal = places[i].front().candidate->feature.normal;
+        if (normal.dot(given[i].first) < 0) normal = -normal;
+        const Vector impulse = share(i, part);
+        const double pressed = impulse.dot(normal);
+        if (pressed <= 0 || (impulse - pressed * normal).norm() > pair_.friction * pressed) {
+          return false;
+        }
+      }
+      return true;
+    };
+    double part = 1;
+    while (part > kLeastEven && !may_be(part)) part *= 0.8;
+    if (part <= kLeastEven) return;
+    for (size_t i = 0; i < places.size(); ++i) {
+      Piece& first = places[i].front();
+      const Vector impulse = share(i, part);
+      // One piece stands for the place, where all its pieces pushed on the average.
+      for (Piece& piece : places[i]) {
+        piece.impulse *= impulse.norm() / std::max(given[i].first.norm(), 1e-300);
+      }
+      Vector rest = impulse;
+      for (const Piece& piece : places[i]) rest -= piece.impulse;
+      first.impulse += rest;
+    }
+  }
+
+  /// The matrix that multiplies a vector by an arm from the left.
+  static Matrix Cross(const Vector& arm) {
+    Matrix cross;
+    cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+    return cross;
   }
 
   /// The time of pieces, weighted by their impulses, s.

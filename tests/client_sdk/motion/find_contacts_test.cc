@@ -124,6 +124,7 @@ TEST(FindContacts, TimesAFlatLandingWhereverItLiesInItsFrame) {
       double impulse = 0;
       for (const FoundBlow& blow : found->blows) {
         impulse -= blow.impulse_newton_seconds.z();
+        EXPECT_NEAR(blow.impulse_newton_seconds.norm(), 0.25 * 2 * 1.5 * kGravity * fall_s, 3e-2);
         EXPECT_NEAR(static_cast<double>(blow.frame) * frame_s + blow.time_s, fall_s,
                     0.006 * frame_s)
             << frame_s << " " << share;
