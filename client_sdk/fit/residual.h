@@ -20,8 +20,9 @@ struct Residual {
   std::vector<ResidualShare> shares;
 };
 
-/// Takes modes from a ring. `index` is the index of the ring among those that ExtractModes had. The
-/// first 5 ms hold what the modes' extrapolation to the blow misses, too.
+/// Takes modes from a ring, each with the amplitude, frequency and decay that it has in this ring:
+/// those of `modes` are of all rings. `index` is the index of the ring among those that
+/// ExtractModes had. The first 5 ms hold what the modes' extrapolation to the blow misses, too.
 Residual ResidualOf(const Ring& ring, size_t index, const std::vector<MeasuredMode>& modes);
 
 }  // namespace carillon::fit
