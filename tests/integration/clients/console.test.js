@@ -298,6 +298,13 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
     const { objects } = await state.services.scenes.listObjects({ scene: state.sceneName() });
     return [state.modes.value[0].frequencyHz, objects[0].lowestFrequencyHz];
   });
+  // A material that was found from recordings is dropped like a mesh, and sounds at once.
+  const spoon = '# E/rho\nyoung_pa: 101e9\npoisson_ratio: 0.34\ndensity_kg_per_m3: 8470\nloss_factor {\n  frequency_hz: 468\n  loss_factor: 0.0004\n}\n';
+  await page.locator('input[type=file]').setInputFiles({ name: 'spoon.textproto', mimeType: 'text/plain', buffer: Buffer.from(spoon) });
+  await page.waitForFunction(() => carillonConsole.state.materialName.value === 'spoon' && !carillonConsole.state.busy.value);
+  for (const hz of await lowestHz()) assert.ok(Math.abs(hz / modes[0] / Math.sqrt(101e9 / 8470 / (2.1e11 / 7850)) - 1) < 0.03, `${hz} Hz`);
+  await page.locator('input[type=file]').setInputFiles({ name: 'none.textproto', mimeType: 'text/plain', buffer: Buffer.from('young_pa: x') });
+  await page.getByText('none.textproto is no material').waitFor();
   await page.getByLabel(/^Material/).selectOption('soda_lime_glass');
   await page.getByText('another Poisson’s ratio').waitFor();
   const speed = await page.evaluate(() => {

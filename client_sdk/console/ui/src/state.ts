@@ -12,6 +12,7 @@ import { JobKind, JobState } from './gen/carillon/v1/decomposition_pb';
 import type { CatalogueMaterial, Material, MaterialSchema } from './gen/carillon/v1/material_pb';
 import { DecompositionSettingsSchema } from './gen/carillon/v1/modal_model_pb';
 import type { ModalModelSummary } from './gen/carillon/v1/modal_model_service_pb';
+import { readMaterial } from './material_file';
 import { previewOf } from './mesh_preview';
 import type { Preview } from './mesh_preview';
 import { fetchModel, fittingTransfer, soundingModes } from './modal_model';
@@ -57,6 +58,8 @@ export const unit = remembered('unit', 0);
 export const newMaterial = remembered('material', 'structural_steel');
 export const models = signal<ModalModelSummary[]>([]);
 export const materials = signal<CatalogueMaterial[]>([]);
+/** Those of files, which the daemon does not know by name. */
+const ownMaterials = new Map<string, CatalogueMaterial>();
 export const mixer = signal<GetMixerResponse | undefined>(undefined);
 export const model = signal<ModalModel | undefined>(undefined);
 export const coarse = signal(false);
@@ -177,13 +180,28 @@ export async function attempt<T>(what: string, work: () => Promise<T>): Promise<
   }
 }
 
+function takeMaterials(named: CatalogueMaterial[]): void {
+  materials.value = [...named.filter(({ name }) => !ownMaterials.has(name)), ...ownMaterials.values()];
+}
+
+/** Lists the material of a file beside the named ones, and lets the body that is open have it. */
+export const takeMaterial = (file: File): Promise<void> => attempt('reading the material', async () => {
+  const own = await readMaterial(file);
+  ownMaterials.set(own.name, own);
+  takeMaterials(materials.value);
+  newMaterial.value = materialName.value = own.name;
+  factors.value = UNCHANGED;
+  await updateObject();
+});
+
 /** Makes everything anew that a lost daemon or connection took away; a daemon may come back later than the console. */
 async function begin(): Promise<void> {
   if (beginning) return;
   beginning = true;
   while (reached.value) {
     const done = await attempt('reading the catalogue', async () => {
-      materials.value = (await services.models.listMaterials({})).materials;
+      takeMaterials((await services.models.listMaterials({})).materials);
+      if (!materials.value.some(({ name }) => name === newMaterial.value)) newMaterial.value = 'structural_steel';
       await listModels();
       scene = (await services.scenes.createScene({})).name;
       object = '';
@@ -373,7 +391,7 @@ export async function createModel(wanted: Upload): Promise<void> {
     tell({ digest: meshDigest });
     const created = await services.models.createModalModel({ meshDigest, coarseFirst: true,
       label: wanted.file.name.replace(/\.[^.]*$/, ''), meshFormat: formatOf(wanted.file),
-      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } }, material: { preset: newMaterial.value } });
+      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } }, material: ownMaterials.get(newMaterial.value)?.material ?? { preset: newMaterial.value } });
     if (!left.aborted) await follow(created.job!, left, tell);
   } catch (error) {
     tell({ refusal: faultOf(error) });

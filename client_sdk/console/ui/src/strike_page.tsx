@@ -4,6 +4,7 @@ import { effect } from '@preact/signals';
 import { BodyView } from './body_view';
 import type { Strike } from './body_view';
 import { JobState, Phase } from './gen/carillon/v1/decomposition_pb';
+import { isMaterialFile } from './material_file';
 import { inUnitOf, placesIn } from './mesh_preview';
 import { hzOf, lowestHz, noteOf } from './modal_model';
 import type { SoundingMode } from './modal_model';
@@ -255,7 +256,9 @@ function Creation() {
   const unit = state.unit.value;
   const [repair, setRepair] = useState(false);
   const choose = (files?: FileList | null) => {
-    if (files?.[0]) void state.createModel({ file: files[0], unit, repair });
+    if (!files?.[0]) return;
+    if (isMaterialFile(files[0])) void state.takeMaterial(files[0]).then(strikeAgain);
+    else void state.createModel({ file: files[0], unit, repair });
   };
   useEffect(() => {
     const over = (event: DragEvent) => event.preventDefault();
@@ -274,7 +277,7 @@ function Creation() {
       {!listed && <option value={open?.name ?? ''}>{open?.summary.label ?? state.upload.value?.file.name ?? 'none yet'}</option>}
       {models.map((one) => <option value={one.name}>{state.nameOf(one)}{made(one)}</option>)}</select></label>
     <Sides />
-    <label>New: drop a mesh file anywhere, or <input type="file" onChange={(event) => choose(event.currentTarget.files)} /></label>
+    <label>New: drop a mesh or material file anywhere, or <input type="file" onChange={(event) => choose(event.currentTarget.files)} /></label>
     <label>its unit <select value={unit} onChange={(event) => { state.unit.value = Number(event.currentTarget.value); }}>
       {UNITS.map(([name, metres]) => <option value={metres}>{name}</option>)}</select></label>
     <label>of <select value={state.newMaterial.value} onChange={(event) => { state.newMaterial.value = event.currentTarget.value; }}>
