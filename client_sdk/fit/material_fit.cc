@@ -21,8 +21,6 @@ constexpr double kLeastLogOdds = 4;
 /// that the log odds must be the greater, the larger the part of the lines that no mode explains.
 constexpr double kLogOddsPerUnmatched = 5;
 constexpr double kMostRms = 0.01;
-/// Part of the measured lines that must be modes of the body.
-constexpr double kLeastMatched = 0.35;
 /// Decays that are known worse than this do not count.
 constexpr double kMostDecayError = 0.45;
 /// Part of the matched lines whose decay must be known for a law that is not given.
@@ -34,7 +32,7 @@ constexpr double kLeastLoudness_db = 20;
 constexpr double kLeastStrike_s = 0.2;
 /// Densities of solid bodies, from light foams to osmium: g/cm^3 in place of kg/m^3 are below.
 constexpr double kLeastDensity = 25, kMostDensity = 25'000;
-/// A law that misses half of the decay rates by a greater factor is none.
+/// No law is taken that misses half of the decay rates by a greater factor.
 constexpr double kMostMissed = 3;
 
 absl::Status TooFew(absl::string_view what) {
@@ -187,6 +185,14 @@ void ApplyLaw(const std::vector<MeasuredDecay>& decays, MaterialFit& fit) {
   fit.damping_error = Median(std::move(matched));
 }
 
+double MissedWithoutAir(std::vector<MeasuredDecay> decays, DampingKind kind) {
+  double air_per_s = 0;
+  for (MeasuredDecay& decay : decays) air_per_s += std::exchange(decay.radiation_per_s, 0);
+  if (air_per_s == 0) return 0;
+  const std::vector<DampingLaw> laws = FitDamping(decays, kind);
+  return laws.empty() ? 0 : laws[0].missed_by;
+}
+
 }  // namespace
 
 absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
@@ -230,13 +236,13 @@ absl::StatusOr<MaterialFit> FitMaterial(const std::vector<FittedBody>& bodies,
   if (known || settings.damping != DampingKind::kAuto) {
     fit.laws = FitDamping(decays, settings.damping);
   }
-  if (!fit.laws.empty()) ApplyLaw(decays, fit);
   if (settings.damping == DampingKind::kAuto && !fit.laws.empty() &&
       fit.laws[0].missed_by > kMostMissed) {
     fit.laws.clear();
-    fit.damping_error = 0;
-    for (FittedLine& line : fit.lines) line.law_per_s = line.law_error_per_s = 0;
   }
+  if (fit.laws.empty()) return fit;
+  ApplyLaw(decays, fit);
+  fit.missed_without_air = MissedWithoutAir(decays, settings.damping);
   return fit;
 }
 

@@ -12,6 +12,9 @@
 
 namespace carillon::fit {
 
+/// Part of the measured lines that must be modes of the body.
+inline constexpr double kLeastMatched = 0.35;
+
 /// A body of the material, its modes as computed and as measured.
 struct FittedBody {
   std::string name;

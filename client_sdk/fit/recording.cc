@@ -148,13 +148,13 @@ double GateFallDb(const std::vector<Ring>& rings) {
     // Differences weaken the hum and the rumble of a room, which vary most.
     std::vector<float> differences(ring.samples.size());
     std::adjacent_difference(ring.samples.begin(), ring.samples.end(), differences.begin());
-    if (!differences.empty()) differences[0] = 0;
     const auto piece = static_cast<size_t>(kNoise_s * ring.sample_rate_hz);
     const auto guard = static_cast<size_t>(kGuard_s * ring.sample_rate_hz);
     if (piece == 0 || ring.onset < 2 * piece + guard) continue;
     const std::vector<double> energies = Energies(differences, piece);
     const size_t before = (ring.onset - guard) / piece, after = (ring.onset + guard) / piece + 1;
     if (after >= energies.size()) continue;
+    // The first piece begins with a sample instead of a difference.
     const double noise = *std::min_element(energies.begin() + 1,
                                            energies.begin() + static_cast<std::ptrdiff_t>(before));
     const double rest =

@@ -16,7 +16,7 @@ namespace {
 /// The blow itself, and modes that end at once, are over by then.
 constexpr double kSettled_s = 0.005;
 constexpr int kSweeps = 3;
-/// Strikes of one body differ by less, relative.
+/// The rates of a mode in two strikes of one body differ by less, relative.
 constexpr double kMostChange = 2e-3;
 constexpr std::array<std::pair<double, double>, 4> kSpans_s = {
     {{0, 0.005}, {0.005, 0.02}, {0.02, 0.1}, {0.1, 3}}};

@@ -22,8 +22,6 @@ constexpr double kLeastExplained = 2e-6;
 constexpr double kFaintShare = 0.2;
 /// Impulses are joined if the momentum of no node becomes less explained by more than this share.
 constexpr double kJoinedShare = 0.05;
-/// Blows of a pair that lie within so many bins cannot be told apart in time.
-constexpr size_t kBinsAtOnce = 2;
 
 /// A number from 1/2 to 2 for a candidate that does not depend on the order of candidates.
 double Varied(const Candidate& candidate, int variant) {
@@ -269,7 +267,8 @@ std::vector<double> ContactProblem::BlowTimes() const {
         sum += size;
         moment += size * TimeOf(candidates_[found[end++]]);
       }
-      if (BinOf(candidates_[found[end - 1]]) > first_bin + kBinsAtOnce) continue;
+      const size_t bins = BinOf(candidates_[found[end - 1]]) - first_bin;
+      if (static_cast<double>(bins) >= kBinsAtOnce) continue;
       for (size_t i = first; i < end; ++i) times[found[i]] = moment / sum;
     }
   }

@@ -9,6 +9,9 @@
 
 namespace carillon::motion {
 
+/// Blows of a pair that lie within this number of bins cannot be told apart in time.
+inline constexpr double kBinsAtOnce = 2.5;
+
 /// The balance of a motion with one unknown for each candidate, and how it is solved.
 class ContactProblem {
  public:

@@ -96,8 +96,8 @@ class PairReading {
     }
   }
 
-  /// Moves what is above the usual load, in one frame or two, into a blow: one within the time of
-  /// these loads, if there is one.
+  /// Moves the part of a load that is above the usual load, in one frame or two, into a blow. A
+  /// blow that was found at the places and within the time of the load takes this part.
   void ReadLeaps() {
     const std::vector<double> forces = forces_;
     std::vector<double> kept(forces.size(), 1);
@@ -159,16 +159,17 @@ class PairReading {
     }
     // Places that cannot be told apart in time have one time.
     const auto [first, last] = std::ranges::minmax(pieces, {}, &Piece::time_s);
-    const bool at_once = last.time_s - first.time_s < 2.5 * bin_s_;
-    if (at_once) Even(places);
-    for (const std::vector<Piece>& place : places) {
-      AddPlace(place, at_once ? MeanTime(pieces) : MeanTime(place), found);
+    const bool at_once = last.time_s - first.time_s < kBinsAtOnce * bin_s_;
+    const std::vector<Vector> impulses = Impulses(places, at_once);
+    for (size_t i = 0; i < places.size(); ++i) {
+      AddPlace(places[i], impulses[i], MeanTime(at_once ? pieces : places[i]), found);
     }
   }
 
-  /// Divides impulses that act at once as evenly as their sum, their torque and friction allow: the
-  /// balance leaves it open how the corners of a face share a blow, and pushes them apart.
-  void Even(std::vector<std::vector<Piece>>& places) const {
+  /// Returns the impulse of each place. Impulses that act at once are divided as evenly as their
+  /// sum, their torque and friction allow: the balance leaves it open how the corners of a face
+  /// share a blow, and pushes the corners apart.
+  std::vector<Vector> Impulses(const std::vector<std::vector<Piece>>& places, bool at_once) const {
     const bool of_a = bodies_.motions[pair_.a].balanced();
     Eigen::Matrix<double, 6, 6> sums = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> whole = Eigen::Matrix<double, 6, 1>::Zero();
@@ -195,6 +196,12 @@ class PairReading {
       const Vector least = even.head<3>() - arm.cross(Vector(even.tail<3>()));
       return Vector(impulse + part * (least - impulse));
     };
+    const auto shares = [&](double part) {
+      std::vector<Vector> impulses;
+      for (size_t i = 0; i < places.size(); ++i) impulses.push_back(share(i, part));
+      return impulses;
+    };
+    if (!at_once) return shares(0);
     const auto may_be = [&](double part) {
       for (size_t i = 0; i < places.size(); ++i) {
         Vector normal = places[i].front().candidate->feature.normal;
@@ -209,18 +216,7 @@ class PairReading {
     };
     double part = 1;
     while (part > kLeastEven && !may_be(part)) part *= 0.8;
-    if (part <= kLeastEven) return;
-    for (size_t i = 0; i < places.size(); ++i) {
-      Piece& first = places[i].front();
-      const Vector impulse = share(i, part);
-      // One piece stands for the place, where all its pieces pushed on the average.
-      for (Piece& piece : places[i]) {
-        piece.impulse *= impulse.norm() / std::max(given[i].first.norm(), 1e-300);
-      }
-      Vector rest = impulse;
-      for (const Piece& piece : places[i]) rest -= piece.impulse;
-      first.impulse += rest;
-    }
+    return shares(part > kLeastEven ? part : 0);
   }
 
   /// The matrix that multiplies a vector by an arm from the left.
@@ -240,7 +236,8 @@ class PairReading {
     return sum > 0 ? moment / sum : pieces.front().time_s;
   }
 
-  void AddPlace(const std::vector<Piece>& pieces, double time_s, FoundContacts& found) {
+  void AddPlace(const std::vector<Piece>& pieces, const Vector& impulse, double time_s,
+                FoundContacts& found) {
     FoundBlow blow;
     blow.a = pair_.a;
     blow.b = pair_.b;
@@ -248,11 +245,11 @@ class PairReading {
     for (const Piece& piece : pieces) {
       const double size = piece.impulse.norm();
       sum += size;
-      blow.impulse_newton_seconds += piece.impulse;
       blow.point_a_m += size * piece.candidate->feature.point_a;
       blow.point_b_m += size * piece.candidate->feature.point_b;
     }
     if (sum == 0) return;
+    blow.impulse_newton_seconds = impulse;
     blow.point_a_m /= sum;
     blow.point_b_m /= sum;
     const double frames = time_s / motion_.frame_s;

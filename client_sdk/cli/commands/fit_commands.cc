@@ -192,8 +192,8 @@ std::string FarCaution(const Nearest& nearest) {
       nearest.name, 1 / speed_squared, 1 / nearest.density_ratio);
 }
 
-/// Says so if Poisson's ratio is unlike that of the nearest named material, which wrong proportions
-/// of the mesh make it.
+/// Says so if Poisson's ratio is far from that of the nearest named material. Wrong proportions of
+/// the mesh change the ratio.
 std::string ProportionCaution(const fit::MaterialFit& fit, const Nearest& nearest) {
   constexpr double kFar = 0.04;
   if (std::abs(nearest.poisson_above) < kFar + 2 * fit.poisson_error) return "";
@@ -238,13 +238,14 @@ std::string AirCaution(const fit::MaterialFit& fit) {
 /// Says so if one of several bodies agrees worse than the others.
 std::string AgreementCaution(const fit::MaterialFit& fit, const std::vector<Source>& sources,
                              size_t body) {
-  constexpr double kWorse = 2, kLeastMatched = 0.35;
+  constexpr double kWorse = 2;
+  if (sources.size() == 1) return "";
   double least = HUGE_VAL;
   for (size_t b = 0; b < sources.size(); ++b) least = std::min(least, AgreementOf(fit, b).rms);
   const Agreement own = AgreementOf(fit, body);
   const bool few =
-      static_cast<double>(own.matched) < kLeastMatched * static_cast<double>(own.lines);
-  if (sources.size() == 1 || (own.rms <= kWorse * least && !few)) return "";
+      static_cast<double>(own.matched) < fit::kLeastMatched * static_cast<double>(own.lines);
+  if (own.rms <= kWorse * least && !few) return "";
   return absl::StrFormat(
       "%s agrees worse than the other bodies, by %d of %s, %.2g %% apart: see its size, and that "
       "its recordings and its material are its own.",
@@ -252,9 +253,8 @@ std::string AgreementCaution(const fit::MaterialFit& fit, const std::vector<Sour
 }
 
 /// What to be cautious about in the recordings of a body.
-std::vector<std::string> CautionsOf(const Source& source) {
-  std::vector<std::string> cautions = {GainCaution(source.extracted),
-                                       ClippedCaution(source.extracted)};
+std::vector<std::string> CautionsOf(const Extracted& extracted) {
+  std::vector<std::string> cautions = {GainCaution(extracted), ClippedCaution(extracted)};
   std::erase(cautions, "");
   return cautions;
 }
@@ -267,7 +267,7 @@ std::vector<std::string> CautionsOf(const fit::MaterialFit& fit,
                                        AirCaution(fit)};
   for (size_t b = 0; b < sources.size(); ++b) {
     cautions.push_back(AgreementCaution(fit, sources, b));
-    std::ranges::copy(CautionsOf(sources[b]), std::back_inserter(cautions));
+    std::ranges::copy(CautionsOf(sources[b].extracted), std::back_inserter(cautions));
   }
   std::erase(cautions, "");
   return cautions;
@@ -527,9 +527,7 @@ absl::Status ExtractModesOf(const ExtractOptions& options, bool json) {
   } else {
     PrintModes(extracted.modes);
     PrintRoom(extracted.room);
-    for (const std::string& caution : {GainCaution(extracted), ClippedCaution(extracted)}) {
-      if (!caution.empty()) absl::PrintF("%s\n", caution);
-    }
+    for (const std::string& caution : CautionsOf(extracted)) absl::PrintF("%s\n", caution);
   }
   return absl::OkStatus();
 }
@@ -560,14 +558,13 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
   absl::StatusOr<fit::MaterialFit> first = fitted();
   if (!first.ok()) {
     for (const Source& source : sources) {
-      for (const std::string& caution : CautionsOf(source)) {
+      for (const std::string& caution : CautionsOf(source.extracted)) {
         absl::FPrintF(stderr, "warning: %s\n", caution);
       }
     }
     return first.status();
   }
   fit::MaterialFit fit = *std::move(first);
-  const double missed_without_air = fit.laws.empty() ? 0 : fit.laws[0].missed_by;
   // What each mode radiates is known once the speed of sound is.
   for (size_t b = 0; b < sources.size(); ++b) {
     sources[b].body.radiation = RadiationOf(models[b], std::sqrt(fit.young_over_density));
@@ -576,9 +573,6 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
     }
   }
   ASSIGN_OR_RETURN(fit, fitted());
-  const bool has_air =
-      std::ranges::any_of(sources, [](const Source& source) { return source.no_air.empty(); });
-  if (has_air) fit.missed_without_air = missed_without_air;
   if (!options.out.empty())
     RETURN_IF_ERROR(WriteText(options.out, MaterialFileText(fit, sources, options)));
   std::vector<fit::ResidualShare> rest;

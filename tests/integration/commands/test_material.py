@@ -65,7 +65,9 @@ class Material(DaemonTest):
             carillon.Sound(sound.samples, round(sound.sample_rate_hz * 1.088)).save(fast)
         found = carillon.fit.material("plate", taps, density=DENSITY, **self.own)
         self.assertAlmostEqual(found.young_pa / self.found.young_pa, 1.088**2, delta=0.01)
+        self.assertEqual(len(found.cautions), 2)
         self.assertIn("sample rate", found.cautions[0])
+        self.assertIn("proportions", found.cautions[1])
         self.assertIn(found.cautions[0], found.text)
 
     def test_changed_recordings_are_cautioned_against(self):

@@ -58,7 +58,7 @@ export const unit = remembered('unit', 0);
 export const newMaterial = remembered('material', 'structural_steel');
 export const models = signal<ModalModelSummary[]>([]);
 export const materials = signal<CatalogueMaterial[]>([]);
-/** Those of files, which the daemon does not know by name. */
+/** Materials of files, which the daemon does not know by name. */
 const ownMaterials = new Map<string, CatalogueMaterial>();
 export const mixer = signal<GetMixerResponse | undefined>(undefined);
 export const model = signal<ModalModel | undefined>(undefined);
@@ -391,7 +391,8 @@ export async function createModel(wanted: Upload): Promise<void> {
     tell({ digest: meshDigest });
     const created = await services.models.createModalModel({ meshDigest, coarseFirst: true,
       label: wanted.file.name.replace(/\.[^.]*$/, ''), meshFormat: formatOf(wanted.file),
-      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } }, material: ownMaterials.get(newMaterial.value)?.material ?? { preset: newMaterial.value } });
+      settings: { metresPerUnit: wanted.unit, mesh: { repair: wanted.repair } },
+      material: ownMaterials.get(newMaterial.value)?.material ?? { preset: newMaterial.value } });
     if (!left.aborted) await follow(created.job!, left, tell);
   } catch (error) {
     tell({ refusal: faultOf(error) });
