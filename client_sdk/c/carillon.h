@@ -8,7 +8,7 @@
  * the scene. Strings are UTF-8 and end with a zero.
  *
  * Every function that returns a carillon_code returns CARILLON_OK if it succeeds. After any other
- * code, carillon_error() and carillon_error_reason() give the cause. proto/README.md lists the
+ * code, carillon_error() and carillon_error_reason() give the cause. proto/errors.md lists the
  * reasons. Results are written only on success. No function throws or ends the program. Different
  * threads may call functions of different objects at the same time. Only one thread at a time may
  * call functions of one object.
@@ -176,7 +176,7 @@ const char* carillon_error(void);
 const char* carillon_error_reason(void);
 /** Returns the probable mistakes in the contacts of one stream or one trace: the stream that this
  * thread has closed, or the trace that it has rendered, whichever happened later. Each line is an
- * id of proto/README.md, such as POINTS_DISTANT, a colon and a sentence. Without a mistake the text
+ * id of proto/errors.md, such as POINTS_DISTANT, a colon and a sentence. Without a mistake the text
  * is empty. The text is valid until this thread closes a stream or renders again. */
 const char* carillon_warnings(void);
 

@@ -45,7 +45,7 @@ struct Body {
   std::string model, material;  ///< of the sound; without a model the body has none
 };
 
-/// The bodies of one fall, as the file of docs/decisions/0042 has them.
+/// The bodies of one fall, as the file of docs/decisions/sound/0042 has them.
 struct FallScene {
   Vector gravity_m_per_s2{0, 0, -9.81};
   double friction = 0.5, restitution = 0;  ///< of every pair of bodies

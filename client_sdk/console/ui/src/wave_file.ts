@@ -20,7 +20,7 @@ export function waveFile(blocks: Uint8Array[], sampleRateHz: number, channels: n
   return new Blob([head, ...blocks.map((block) => new Uint8Array(block))], { type: 'audio/wav' });
 }
 
-/** Renders the last strike, until it has fallen by 60 dB or for a minute, and saves it under the names of the body and its material. */
+/** Renders the last strike until it has died away, or for a minute, and saves it under the names of the body and its material. */
 export async function saveStrike(): Promise<void> {
   const { point: [px, py, pz], impulse: [x, y, z], striker, ...object } = strikeToRender();
   const name = `${state.nameOf(state.model.value!.summary)}_${state.materialName.value}`;

@@ -36,7 +36,7 @@ namespace carillon::client {
 /// needs, or Call() for many of them. The base class answers every other call with UNIMPLEMENTED.
 ///
 /// Errors: a failed call returns a status whose message is "REASON: text for people"; ToErrorInfo()
-/// takes it apart. proto/README.md lists the reasons that the daemon gives. In addition, every call
+/// takes it apart. proto/errors.md lists the reasons that the daemon gives. In addition, every call
 /// can return UNAVAILABLE (SERVER_UNAVAILABLE) if no daemon answers, and DEADLINE_EXCEEDED
 /// (SERVER_TIMEOUT) after the time that WithTimeout() was given. Without it, a call that transfers
 /// no stream and no file gives up after 60 seconds, and other calls never.
