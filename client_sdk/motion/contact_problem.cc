@@ -46,9 +46,7 @@ ContactProblem::ContactProblem(const Motion& motion, const SearchBodies& bodies,
       candidates_(std::move(candidates)),
       blows_of_pair_(search.pairs().size()),
       loads_of_pair_(search.pairs().size()),
-      // A blow and a load at one frame do nearly the same, and must not stop each other halfway.
-      // Between frames a solution to the end divides ambiguous impulses more evenly, but no better.
-      balance_(bodies.motions.size(), motion.frame_count(), motion.frames_are_steps) {
+      balance_(bodies.motions.size(), motion.frame_count()) {
   for (const BodyMotion& body : bodies.motions) balanced_.push_back(body.balanced());
   AddNodes(motion, bodies, search);
   for (size_t i = 0; i < candidates_.size(); ++i) {

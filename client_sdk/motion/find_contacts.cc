@@ -102,50 +102,38 @@ std::optional<SearchBodies> Prepare(const Motion& motion) {
   return bodies;
 }
 
-/// Says how far the body whose momentum is least explained was from any other.
-void SetNearest(const Motion& motion, const SearchBodies& bodies, Confidence& confidence) {
-  const size_t worst = confidence.worst_body, frame = confidence.worst_frame;
-  const auto pose = [&](size_t body) {
-    return motion.bodies[body].poses[motion.bodies[body].poses.size() > 1 ? frame : 0];
-  };
-  confidence.worst_radius_m = bodies.motions[worst].radius_m();
-  double nearest = 1e300;
-  for (size_t other = 0; other < motion.bodies.size(); ++other) {
-    if (other == worst) continue;
-    for (const Vector& vertex : motion.bodies[worst].touching().vertices_m) {
-      const Vector point =
-          pose(other).orientation.conjugate() *
-          (pose(worst).position_m + pose(worst).orientation * vertex - pose(other).position_m);
-      const double far = std::min(nearest, bodies.surfaces[other]->box().exteriorDistance(point) +
-                                               bodies.surfaces[other]->box().diagonal().norm());
-      if (const auto at = bodies.surfaces[other]->Nearest(point, far)) {
-        const double rounding_m = motion.bodies[worst].rounding_m + motion.bodies[other].rounding_m;
-        nearest = std::min(nearest, std::abs(at->gap_m - rounding_m));
-      }
-    }
-  }
-  confidence.nearest_gap_m = nearest;
-}
-
-/// How deep a vertex of one body lies inside of another at a frame, m; 0 if none does.
-double Depth(const Motion& motion, const SearchBodies& bodies, size_t one, size_t other,
-             size_t frame) {
+/// Returns the least distance of a vertex of one body from the surface of another at a frame, m, if
+/// it is below `far_m`, which is returned otherwise. It is negative inside.
+double Distance(const Motion& motion, const SearchBodies& bodies, size_t one, size_t other,
+                size_t frame, double far_m) {
   const auto pose = [&](size_t body) {
     return motion.bodies[body].poses[motion.bodies[body].poses.size() > 1 ? frame : 0];
   };
   const BodyPose of_one = pose(one), of_other = pose(other);
   const double rounding_m = motion.bodies[one].rounding_m + motion.bodies[other].rounding_m;
-  double depth_m = 0;
+  const SurfaceIndex& surface = *bodies.surfaces[other];
   for (const Vector& vertex : motion.bodies[one].touching().vertices_m) {
     const Vector point = of_other.orientation.conjugate() *
                          (of_one.position_m + of_one.orientation * vertex - of_other.position_m);
-    if (bodies.surfaces[other]->box().exteriorDistance(point) > rounding_m) continue;
-    const double far_m = bodies.surfaces[other]->box().diagonal().norm() + rounding_m;
-    if (const auto at = bodies.surfaces[other]->Nearest(point, far_m)) {
-      depth_m = std::max(depth_m, rounding_m - at->gap_m);
+    const double outside_m = surface.box().exteriorDistance(point);
+    if (outside_m > 0 && outside_m - rounding_m > far_m) continue;
+    if (const auto at = surface.Nearest(point, outside_m + surface.box().diagonal().norm())) {
+      far_m = std::min(far_m, at->gap_m - rounding_m);
     }
   }
-  return depth_m;
+  return far_m;
+}
+
+/// Says how far the body whose momentum is least explained was from any other.
+void SetNearest(const Motion& motion, const SearchBodies& bodies, Confidence& confidence) {
+  const size_t worst = confidence.worst_body;
+  confidence.worst_radius_m = bodies.motions[worst].radius_m();
+  double nearest = 1e300;
+  for (size_t other = 0; other < motion.bodies.size(); ++other) {
+    if (other == worst) continue;
+    nearest = Distance(motion, bodies, worst, other, confidence.worst_frame, nearest);
+  }
+  confidence.nearest_gap_m = std::max(0.0, nearest);
 }
 
 /// Says which bodies are deepest in each other in the frames around their blows.
@@ -155,8 +143,8 @@ void SetDeepest(const Motion& motion, const SearchBodies& bodies, FoundContacts&
     const double radius_m =
         std::min(bodies.motions[blow.a].radius_m(), bodies.motions[blow.b].radius_m());
     for (const size_t frame : {size_t{blow.frame}, size_t{blow.frame} + 1}) {
-      const double depth_m = std::max(Depth(motion, bodies, blow.a, blow.b, frame),
-                                      Depth(motion, bodies, blow.b, blow.a, frame));
+      const double depth_m = -std::min(Distance(motion, bodies, blow.a, blow.b, frame, 0),
+                                       Distance(motion, bodies, blow.b, blow.a, frame, 0));
       if (depth_m <= confidence.deepest_part * radius_m) continue;
       confidence.deepest_part = depth_m / radius_m;
       confidence.deepest_m = depth_m;

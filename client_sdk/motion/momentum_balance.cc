@@ -43,8 +43,8 @@ Vector Project(const Vector& f, const Vector& normal, double friction) {
 
 }  // namespace
 
-MomentumBalance::MomentumBalance(size_t body_count, size_t frame_count, bool to_the_end)
-    : frames_(frame_count), to_the_end_(to_the_end), rows_(body_count * frame_count) {}
+MomentumBalance::MomentumBalance(size_t body_count, size_t frame_count)
+    : frames_(frame_count), rows_(body_count * frame_count) {}
 
 void MomentumBalance::AddNode(size_t body, size_t frame, double mass_kg,
                               const Matrix& inverse_inertia, const Vector& impulse,
@@ -169,7 +169,7 @@ double MomentumBalance::Sweep(std::span<Active> island, double cost_factor, doub
     const Vector change = Best(one, pull, cost_factor * u.cost) - value;
     const double gain = change.dot(one.hessian * change);
     // The first to change may be the one that the sweep before has ended with, and gain nothing.
-    one.rests = gain <= faint_gain && (gained > 0 || !to_the_end_) ? kRestSweeps : 0;
+    one.rests = gain <= faint_gain && gained > 0 ? kRestSweeps : 0;
     if (gain == 0) continue;
     one.step = change;
     value += change;
@@ -201,6 +201,8 @@ void MomentumBalance::Repeat(std::span<Active> island, double share) {
   }
 }
 
+/// Ends with a sweep of all unknowns that gains nothing: a blow at a frame and a load there do
+/// nearly the same, and if one rested, they would stop each other halfway.
 void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double end_gain) {
   constexpr int kMostSweeps = 100;
   double before = 0;
@@ -209,7 +211,7 @@ void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, 
     const double faint = kFaintGain * before / static_cast<double>(island.size());
     const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
     if (gained <= end_gain) {
-      if (all_took_part || !to_the_end_) return;
+      if (all_took_part) return;
       for (Active& one : island) one.rests = 0;
       all_took_part = true;
       before = 0;

@@ -47,9 +47,7 @@ struct Unknown {
 /// zero. Islands of unknowns that share no node are solved apart, in parallel.
 class MomentumBalance {
  public:
-  /// With `to_the_end` a solution ends with a sweep of all unknowns that gains nothing. Otherwise
-  /// it may end while some rest: of contacts that do the same, the first ones keep their share.
-  MomentumBalance(size_t body_count, size_t frame_count, bool to_the_end);
+  MomentumBalance(size_t body_count, size_t frame_count);
 
   /// Adds the balance of a body at a node to b.
   void AddNode(size_t body, size_t frame, double mass_kg, const Matrix& inverse_inertia,
@@ -112,7 +110,6 @@ class MomentumBalance {
   std::vector<Island> FindIslands(std::vector<Active>& active) const;
 
   size_t frames_;
-  bool to_the_end_;
   std::vector<Row> rows_;
   std::vector<Unknown> unknowns_;
   std::vector<Vector> values_;

@@ -11,7 +11,7 @@
 namespace carillon {
 
 /// Returns a status of `code` with the message "REASON: message". Every absl::Status that can reach
-/// a user through the API is made by this function. proto/README.md lists the reasons.
+/// a user through the API is made by this function. proto/errors.md lists the reasons.
 absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::string_view message);
 
 /// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").

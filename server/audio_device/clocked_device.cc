@@ -23,7 +23,7 @@ absl::Status ClockedDevice::Start(FrameSource& source) {
   // A sound card does not wait for other programs. If this thread were kept from running, it would
   // afterwards pull all missed blocks at once, faster than they can be rendered. A refusal is
   // ignored here, because LookAhead makes the same request and reports the refusal.
-  MakeRealtime(thread_).IgnoreError();
+  MakeRealtime(thread_, Urgency::kRendering).IgnoreError();
   return absl::OkStatus();
 }
 

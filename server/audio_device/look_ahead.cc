@@ -22,7 +22,7 @@ absl::Status LookAhead::Start() {
   stopping_ = false;
   FillUp();
   thread_ = std::thread([this] { Run(); });
-  return MakeRealtime(thread_);
+  return MakeRealtime(thread_, Urgency::kRendering);
 }
 
 void LookAhead::Stop() {

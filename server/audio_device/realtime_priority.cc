@@ -7,16 +7,11 @@
 #include "proto/cpp/error_reason.h"
 
 namespace carillon {
-namespace {
 
-/// Below the threads of sound servers, which usually run at 10 to 70, and kernel interrupts, at 50.
-constexpr int kPriority = 9;
-
-}  // namespace
-
-absl::Status MakeRealtime(std::thread& thread) {
+absl::Status MakeRealtime(std::thread& thread, Urgency urgency) {
+  // The threads of sound servers usually run at 10 to 70, and kernel interrupts at 50.
   sched_param parameters{};
-  parameters.sched_priority = kPriority;
+  parameters.sched_priority = static_cast<int>(urgency);
   // RESET_ON_FORK: a decomposition started by a real-time process must not inherit the priority.
   if (pthread_setschedparam(thread.native_handle(), SCHED_FIFO | SCHED_RESET_ON_FORK,
                             &parameters) == 0) {

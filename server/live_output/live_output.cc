@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/cpp/status_macros.h"
+#include "server/audio_device/realtime_priority.h"
 #include "server/synthesis/flush_denormals.h"
 
 namespace carillon {
@@ -79,6 +80,8 @@ absl::Status LiveOutput::Open() {
                                         .program = settings_.device_program},
                                        look_ahead_.source(), clock_, log_, [this] { Wake(); }));
   housekeeper_ = std::thread([this] { KeepHouse(); });
+  // Listeners play what it delivers. LookAhead makes the same request and reports the refusal.
+  MakeRealtime(housekeeper_, Urgency::kDelivery).IgnoreError();
   return absl::OkStatus();
 }
 

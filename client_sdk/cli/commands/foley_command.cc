@@ -18,6 +18,7 @@
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/motion/contact_steps.h"
 #include "client_sdk/motion/find_contacts.h"
+#include "client_sdk/motion/pose_noise.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/escaped_text.h"
 #include "proto/cpp/status_macros.h"
@@ -80,6 +81,23 @@ absl::Status CheckSounds(const FoleyScene& foley) {
   if (sounds) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
                  "no body has a material: name one, such as --material '*=oak', or see --list");
+}
+
+/// Leaves so few frames of noisy poses that their noise passes for no contact: a hat function of n
+/// frames takes the noise of a pose for an n-th of the velocity.
+void TakeNoiseOut(motion::MotionScene& scene) {
+  const motion::PoseNoise noise = motion::MeasureNoise(scene.motion);
+  const size_t apart = noise.frames_apart;
+  if (apart == 1 && noise.suffices) return;
+  motion::TakeEach(apart, scene.motion);
+  for (motion::SceneListener& listener : scene.listeners) {
+    motion::TakeEach(apart, listener.poses);
+  }
+  absl::FPrintF(stderr,
+                "warning: the poses have noise of %.2g mm: contacts are found at %.3g frames a "
+                "second%s\n",
+                1000 * noise.place_m, 1 / scene.motion.frame_s,
+                noise.suffices ? "" : ", which still shows impacts that never were");
 }
 
 /// Refuses contacts that do not explain the motion, and warns of doubtful ones.
@@ -351,12 +369,13 @@ absl::Status RenderStems(const client::Client& daemon, const FoleyOptions& optio
 }  // namespace
 
 absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
-  ASSIGN_OR_RETURN(const FoleyScene foley, ReadFoleyScene(options));
+  ASSIGN_OR_RETURN(FoleyScene foley, ReadFoleyScene(options));
   if (options.list) {
     List(foley);
     return absl::OkStatus();
   }
   RETURN_IF_ERROR(CheckSounds(foley));
+  TakeNoiseOut(foley.scene);
   ASSIGN_OR_RETURN(motion::FoundContacts found,
                    motion::FindContacts(foley.scene.motion, options.force));
   RETURN_IF_ERROR(Judge(foley.scene.motion, found, options.force));

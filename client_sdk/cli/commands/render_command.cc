@@ -35,9 +35,8 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
-    absl::FPrintF(out,
-                  "the file peaks at %s; raise it by --gain, --normalize or --full-scale-pa %.2g\n",
-                  Decibels(summary.peak()), std::max(summary.peak_pa() * 2, kLeastFullScale_pa));
+    absl::FPrintF(out, "the file peaks at %s; raise it by --gain or --normalize\n",
+                  Decibels(summary.peak()));
   }
 }
 

@@ -185,16 +185,25 @@ TEST(FindContacts, FindsBouncesInBulletAtAnyFrameRate) {
   }
 }
 
-TEST(FindContacts, FindsAllCornersOfABoxFrom120FramesOn) {
-  for (const int rate : {120, 240}) {
-    const Fall fall = Drop(CornerScene(), falls::FallInBullet, 2400 / rate);
-    const auto found = FindContacts(fall.motion);
-    ASSERT_TRUE(found.ok()) << found.status();
-    const Likeness is = Compare(fall, *found);
-    EXPECT_EQ(is.found_count, is.true_count) << rate;
-    EXPECT_LE(is.false_share, 0.03) << rate;
-    EXPECT_LT(is.median_dt_s, 5e-4) << rate;
-    EXPECT_LT(is.median_vector_error, 0.05) << rate;
+TEST(FindContacts, FindsTheCornersOfABoxWhereverTheyLandInAFrame) {
+  // Blows at a frame compete with loads there.
+  constexpr int kFalls = 20;
+  for (const int rate : {120, 240, 480}) {
+    double error = 0;
+    for (int i = 0; i < kFalls; ++i) {
+      falls::FallScene scene = CornerScene();
+      scene.bodies[1].position_m[2] += 0.0013 * i;
+      const Fall fall = Drop(scene, falls::FallInBullet, 2400 / rate);
+      const auto found = FindContacts(fall.motion);
+      ASSERT_TRUE(found.ok()) << found.status();
+      const Likeness is = Compare(fall, *found);
+      EXPECT_GE(is.found_share, rate == 120 ? 0.9 : 0.95) << rate << " " << i;
+      EXPECT_LE(is.false_share, 0.05) << rate << " " << i;
+      EXPECT_LT(is.median_dt_s, rate == 120 ? 1e-3 : 5e-4) << rate << " " << i;
+      error += is.median_vector_error / kFalls;
+      EXPECT_LT(found->confidence.unexplained, rate == 120 ? 0.015 : 0.001) << rate << " " << i;
+    }
+    EXPECT_LT(error, 0.05) << rate;
   }
 }
 
@@ -305,7 +314,7 @@ TEST(FindContacts, FindsTheSameBlowsInATurnedAndShiftedScene) {
   const std::vector<PairBlow> first = Clustered(fall.motion, *a), second = Clustered(turned, *b);
   ASSERT_EQ(first.size(), second.size());
   for (size_t i = 0; i < first.size(); ++i) {
-    EXPECT_NEAR(first[i].time_s, second[i].time_s, 3e-4);
+    EXPECT_NEAR(first[i].time_s, second[i].time_s, 1e-3);
     // The cone of friction and the order of the unknowns leave some freedom.
     EXPECT_NEAR(first[i].impulse.norm(), second[i].impulse.norm(), 0.05 * first[i].impulse.norm());
   }
