@@ -259,7 +259,28 @@ class PairReading {
         bodies_.motions[pair_.a].At(blow.frame, blow.time_s, Path::kKnown).orientation;
     blow.orientation_b =
         bodies_.motions[pair_.b].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+    blow.approach_m_per_s = Approach(blow, pieces.front().candidate->feature.normal, time_s);
     found.blows.push_back(blow);
+  }
+
+  /// The speed at which both bodies approach each other at a blow: that of one bin before, when
+  /// nothing of the blow has acted yet, and of the free flight since then.
+  double Approach(const FoundBlow& blow, Vector normal, double time_s) const {
+    const double before_s = std::max(0.0, time_s - bin_s_);
+    const size_t interval =
+        std::min(static_cast<size_t>(before_s / motion_.frame_s + 1e-9), forces_.size() - 2);
+    const double since_s =
+        std::max(0.0, before_s - static_cast<double>(interval) * motion_.frame_s);
+    const auto velocity = [&](uint32_t body, const Turn& orientation, const Vector& point_m) {
+      const BodyMotion& motion = bodies_.motions[body];
+      Vector of =
+          motion.KnownVelocity(interval, since_s, orientation * (point_m - motion.centre_m()));
+      if (motion.balanced()) of += motion_.gravity_m_per_s2 * (time_s - before_s);
+      return of;
+    };
+    if (normal.dot(blow.impulse_newton_seconds) < 0) normal = -normal;
+    return std::max(0.0, normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
+                                    velocity(blow.a, blow.orientation_a, blow.point_a_m)));
   }
 
   void AddLoad(size_t frame, const Piece& piece, FoundContacts& found) const {

@@ -48,6 +48,9 @@ class StepMaker {
     row->set_kind(v1::CONTACT_KIND_IMPACT);
     row->set_time_offset_s(blow.time_s);
     Set(*row->mutable_impulse_newton_seconds(), impulse);
+    if (blow.approach_m_per_s > 0) {
+      row->mutable_hertz()->set_approach_speed_m_per_s(blow.approach_m_per_s);
+    }
   }
 
   void Add(const FoundLoad& load) {

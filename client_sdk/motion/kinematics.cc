@@ -141,22 +141,30 @@ BodyPose BodyMotion::At(size_t interval, double time_s, Path path) const {
   return Known(interval, time_s);
 }
 
-BodyPose BodyMotion::Known(size_t interval, double time_s) const {
+Vector BodyMotion::Acceleration(size_t frame) const { return gravity_ + forces_[frame] / mass_kg_; }
+
+Vector BodyMotion::StartVelocity(size_t interval) const {
   const double h = frame_s_;
-  const Vector a0 = gravity_ + forces_[interval] / mass_kg_,
-               a1 = gravity_ + forces_[interval + 1] / mass_kg_;
-  Vector velocity =
-      (places_[interval + 1].position_m - places_[interval].position_m) / h - h * (a0 / 3 + a1 / 6);
-  Vector bent = Vector::Zero();
+  Vector velocity = (places_[interval + 1].position_m - places_[interval].position_m) / h -
+                    h * (Acceleration(interval) / 3 + Acceleration(interval + 1) / 6);
   for (const BodyImpulse& impulse : impulses_[interval]) {
     velocity -= (1 - impulse.time_s / h) * impulse.impulse / mass_kg_;
+  }
+  return velocity;
+}
+
+BodyPose BodyMotion::Known(size_t interval, double time_s) const {
+  const double h = frame_s_;
+  const Vector a0 = Acceleration(interval), a1 = Acceleration(interval + 1);
+  Vector bent = Vector::Zero();
+  for (const BodyImpulse& impulse : impulses_[interval]) {
     bent += std::max(0.0, time_s - impulse.time_s) * impulse.impulse / mass_kg_;
   }
   Vector momentum = start_[interval];
   const Turn turn =
       TurnThrough(inertia_, places_[interval].orientation, time_s, TorquesOf(interval), momentum);
-  return {places_[interval].position_m + velocity * time_s + bent + a0 * time_s * time_s / 2 +
-              (a1 - a0) * time_s * time_s * time_s / (6 * h),
+  return {places_[interval].position_m + StartVelocity(interval) * time_s + bent +
+              a0 * time_s * time_s / 2 + (a1 - a0) * time_s * time_s * time_s / (6 * h),
           turn};
 }
 
@@ -174,6 +182,20 @@ Vector BodyMotion::VelocityAt(size_t frame, const Vector& arm) const {
   const Vector velocity = (places_[after + 1].position_m - places_[before].position_m) /
                           (frame_s_ * static_cast<double>(after + 1 - before));
   return velocity + ((turn_[before] + turn_[after]) / (2 * frame_s_)).cross(arm);
+}
+
+Vector BodyMotion::KnownVelocity(size_t interval, double time_s, const Vector& arm) const {
+  if (!balanced()) return VelocityAt(interval, arm);
+  const Vector a0 = Acceleration(interval), a1 = Acceleration(interval + 1);
+  Vector velocity =
+      StartVelocity(interval) + a0 * time_s + (a1 - a0) * time_s * time_s / (2 * frame_s_);
+  for (const BodyImpulse& impulse : impulses_[interval]) {
+    if (impulse.time_s <= time_s) velocity += impulse.impulse / mass_kg_;
+  }
+  Vector momentum = start_[interval];
+  const Turn turn =
+      TurnThrough(inertia_, places_[interval].orientation, time_s, TorquesOf(interval), momentum);
+  return velocity + (turn * (inertia_.inverse * (turn.conjugate() * momentum))).cross(arm);
 }
 
 double BodyMotion::Jump(size_t node) const {

@@ -59,6 +59,9 @@ class BodyMotion {
   double Angle(size_t interval) const { return turn_[interval].norm(); }
   /// The velocity of a point `arm` away from the centre of mass, averaged around a frame.
   Vector VelocityAt(size_t frame, const Vector& arm) const;
+  /// The velocity of a point `arm` away from the centre of mass at a time within an interval, by
+  /// what is known.
+  Vector KnownVelocity(size_t interval, double time_s, const Vector& arm) const;
   /// The greatest change of the velocity of any point at a node beyond free flight, m/s.
   double Jump(size_t node) const;
 
@@ -69,6 +72,9 @@ class BodyMotion {
  private:
   bool moves() const { return places_.size() > 1; }
   BodyPose Known(size_t interval, double time_s) const;
+  Vector Acceleration(size_t frame) const;
+  /// The velocity of the centre at the beginning of an interval.
+  Vector StartVelocity(size_t interval) const;
   std::vector<TorqueImpulse> TorquesOf(size_t interval) const;
   Vector Guess(size_t interval) const;
   void Shoot(size_t interval);

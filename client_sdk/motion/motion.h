@@ -90,6 +90,8 @@ struct FoundBlow : ContactPoint {
   Vector impulse_newton_seconds = Vector::Zero();  ///< in the scene's axes
   Turn orientation_a = Turn::Identity();           ///< how a lies at the time of the blow
   Turn orientation_b = Turn::Identity();
+  /// Speed at which the bodies approach each other there before, m/s; 0 if it is not known.
+  double approach_m_per_s = 0;
   /// Share of the impulse that other solutions, which explain the motion as well, do not have.
   double ambiguity = 0;
 };

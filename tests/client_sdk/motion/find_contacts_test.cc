@@ -86,6 +86,11 @@ TEST(FindContacts, TimesOneBounceWhereverItLiesInItsFrame) {
       // times at which a frame is searched, of which only one is taken.
       EXPECT_NEAR(blows[0].time_s, bounce.time_s, 0.003 * frame_s);
       EXPECT_NEAR(blows[0].impulse.z(), bounce.impulse, 3e-3 * bounce.impulse);
+      for (const FoundBlow& blow : found->blows) {
+        // The ball has a tenth of a kilogram and the restitution 0.7.
+        const double speed = bounce.impulse / (0.1 * 1.7);
+        EXPECT_NEAR(blow.approach_m_per_s, speed, 0.01 * speed) << frame_s << " " << first_s;
+      }
       EXPECT_LT(found->confidence.unexplained, 3e-4);
     }
   }
