@@ -14,6 +14,8 @@ namespace {
 /// An island is solved when a sweep gains less than this share of its energy, in J per J. Where the
 /// costs decide, they decide little, and sooner than that is soon enough.
 constexpr double kEndShare = 1e-13, kEndShareOfCosts = 1e-6;
+/// If all unknowns take part in a sweep, this share is soon enough as well.
+constexpr double kEnoughShare = 1e-8;
 /// An unknown whose change gains less than this share of the mean rests for some sweeps.
 constexpr double kFaintGain = 0.01;
 constexpr int kRestSweeps = 3;
@@ -201,16 +203,18 @@ void MomentumBalance::Repeat(std::span<Active> island, double share) {
   }
 }
 
-/// Ends with a sweep of all unknowns that gains nothing: a blow at a frame and a load there do
-/// nearly the same, and if one rested, they would stop each other halfway.
-void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double end_gain) {
+/// Ends with a sweep of all unknowns that gains next to nothing: a blow at a frame and a load there
+/// do nearly the same, and if one rested, they would stop each other halfway.
+void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double energy) {
+  const double end_gain = (cost_factor < 1 ? kEndShare : kEndShareOfCosts) * energy;
+  const double enough_gain = std::max(end_gain, kEnoughShare * energy);
   constexpr int kMostSweeps = 100;
   double before = 0;
   bool all_took_part = true;
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
     const double faint = kFaintGain * before / static_cast<double>(island.size());
     const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
-    if (gained <= end_gain) {
+    if (gained <= (all_took_part ? enough_gain : end_gain)) {
       if (all_took_part) return;
       for (Active& one : island) one.rests = 0;
       all_took_part = true;
@@ -275,7 +279,7 @@ void MomentumBalance::Solve(double cost_factor, double least) {
     const std::vector<Island> islands = FindIslands(active);
     InParallel(islands.size(), [&](size_t i) {
       SolveIsland(std::span(active).subspan(islands[i].first, islands[i].count), cost_factor,
-                  (cost_factor < 1 ? kEndShare : kEndShareOfCosts) * islands[i].energy);
+                  islands[i].energy);
     });
     std::erase_if(active, [&](const Active& one) {
       const bool idle = values_[one.unknown].isZero(0);

@@ -106,7 +106,7 @@ class MomentumBalance {
   Vector Best(const Active& active, const Vector& pull, double cost) const;
   double Sweep(std::span<Active> island, double cost_factor, double faint_gain, bool backwards);
   void Repeat(std::span<Active> island, double share);
-  void SolveIsland(std::span<Active> island, double cost_factor, double end_gain);
+  void SolveIsland(std::span<Active> island, double cost_factor, double energy);
   std::vector<Island> FindIslands(std::vector<Active>& active) const;
 
   size_t frames_;

@@ -27,8 +27,8 @@ def scenes():
            "max_frequency_hz": 8000}
     start = {"position_m": (0, 0, 0.3), "velocity_m_per_s": (0.3, 0, 0),
              "orientation": (0.84419, 0.3485584, -0.4056972, -0.03549596)}
-    return {body["name"]: {"friction": 0.5, "restitution": 0.3, "seconds": 1.2, "bodies": [floor, {**body, **start}]}
-            for body in ({**block, "name": "block"}, box)}
+    return {body["name"]: {"friction": 0.5, "restitution": 0.3, "seconds": 1.2,
+                           "bodies": [floor, {**body, **start}]} for body in ({**block, "name": "block"}, box)}
 
 
 def decibels(power):
