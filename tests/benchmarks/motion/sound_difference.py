@@ -38,7 +38,8 @@ def decibels(power):
 def octaves_db(samples):
     power = numpy.abs(numpy.fft.rfft(samples)) ** 2
     hz = numpy.fft.rfftfreq(len(samples), 1 / SAMPLE_RATE_HZ)
-    return {centre: decibels(power[(hz >= centre / 2 ** 0.5) & (hz < centre * 2 ** 0.5)].sum()) for centre in OCTAVES_HZ}
+    edge = 2 ** 0.5
+    return {centre: decibels(power[(hz >= centre / edge) & (hz < centre * edge)].sum()) for centre in OCTAVES_HZ}
 
 
 def envelope_db(samples):
