@@ -206,21 +206,29 @@ TEST(FindContacts, FindsTheCornersOfABoxWhereverTheyLandInAFrame) {
       EXPECT_LE(is.false_share, 0.05) << rate << " " << i;
       EXPECT_LT(is.median_dt_s, rate == 120 ? 1e-3 : 5e-4) << rate << " " << i;
       error += is.median_vector_error / kFalls;
-      EXPECT_LT(found->confidence.unexplained, rate == 120 ? 0.015 : 0.001) << rate << " " << i;
+      EXPECT_LT(found->confidence.unexplained, rate == 120 ? 0.02 : 0.001) << rate << " " << i;
     }
     EXPECT_LT(error, 0.05) << rate;
   }
 }
 
-TEST(FindContacts, FindsMostOfAPileAtSixtyFramesAndCallsItAmbiguous) {
-  const Fall fall = Drop(BlocksScene(), falls::FallInBullet, 40);
-  const auto found = FindContacts(fall.motion);
-  ASSERT_TRUE(found.ok()) << found.status();
-  const Likeness is = Compare(fall, *found);
-  EXPECT_GE(is.found_share, 0.8);
-  EXPECT_LE(is.false_share, 0.15);
-  EXPECT_LT(found->confidence.unexplained, 0.001);
-  EXPECT_GT(found->confidence.ambiguity, 0.3);
+TEST(FindContacts, FindsMostOfPilesAtSixtyFramesAndCallsThemAmbiguous) {
+  constexpr int kPiles = 4;
+  double found_share = 0, false_share = 0;
+  for (int i = 0; i < kPiles; ++i) {
+    falls::FallScene scene = BlocksScene();
+    scene.bodies.back().position_m[0] -= 0.003 * i;
+    const Fall fall = Drop(scene, falls::FallInBullet, 40);
+    const auto found = FindContacts(fall.motion);
+    ASSERT_TRUE(found.ok()) << found.status();
+    const Likeness is = Compare(fall, *found);
+    found_share += is.found_share / kPiles;
+    false_share += is.false_share / kPiles;
+    EXPECT_LT(found->confidence.unexplained, 0.005) << i;
+    EXPECT_GT(found->confidence.ambiguity, 0.3) << i;
+  }
+  EXPECT_GE(found_share, 0.8);
+  EXPECT_LE(false_share, 0.15);
 }
 
 TEST(FindContacts, FindsEqualAndOppositeImpulsesInTheAir) {
