@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace carillon::motion {
@@ -252,9 +253,7 @@ class PairReading {
     blow.impulse_newton_seconds = impulse;
     blow.point_a_m /= sum;
     blow.point_b_m /= sum;
-    const double frames = time_s / motion_.frame_s;
-    blow.frame = std::min(static_cast<size_t>(frames + 1e-9), forces_.size() - 2);
-    blow.time_s = std::max(0.0, frames - static_cast<double>(blow.frame)) * motion_.frame_s;
+    std::tie(blow.frame, blow.time_s) = FrameOf(time_s);
     blow.orientation_a =
         bodies_.motions[pair_.a].At(blow.frame, blow.time_s, Path::kKnown).orientation;
     blow.orientation_b =
@@ -263,18 +262,22 @@ class PairReading {
     found.blows.push_back(blow);
   }
 
+  /// The frame at or before a time since the first frame, s, and the time since that frame, s.
+  std::pair<size_t, double> FrameOf(double time_s) const {
+    const double frames = time_s / motion_.frame_s;
+    const size_t frame = std::min(static_cast<size_t>(frames + 1e-9), forces_.size() - 2);
+    return {frame, std::max(0.0, frames - static_cast<double>(frame)) * motion_.frame_s};
+  }
+
   /// The speed at which both bodies approach each other at a blow: that of one bin before, when
   /// nothing of the blow has acted yet, and of the free flight since then.
   double Approach(const FoundBlow& blow, Vector normal, double time_s) const {
     const double before_s = std::max(0.0, time_s - bin_s_);
-    const size_t interval =
-        std::min(static_cast<size_t>(before_s / motion_.frame_s + 1e-9), forces_.size() - 2);
-    const double since_s =
-        std::max(0.0, before_s - static_cast<double>(interval) * motion_.frame_s);
+    const std::pair<size_t, double> before = FrameOf(before_s);
     const auto velocity = [&](uint32_t body, const Turn& orientation, const Vector& point_m) {
       const BodyMotion& motion = bodies_.motions[body];
-      Vector of =
-          motion.KnownVelocity(interval, since_s, orientation * (point_m - motion.centre_m()));
+      Vector of = motion.KnownVelocity(before.first, before.second,
+                                       orientation * (point_m - motion.centre_m()));
       if (motion.balanced()) of += motion_.gravity_m_per_s2 * (time_s - before_s);
       return of;
     };

@@ -59,8 +59,8 @@ class BodyMotion {
   double Angle(size_t interval) const { return turn_[interval].norm(); }
   /// The velocity of a point `arm` away from the centre of mass, averaged around a frame.
   Vector VelocityAt(size_t frame, const Vector& arm) const;
-  /// The velocity of a point `arm` away from the centre of mass at a time within an interval, by
-  /// what is known.
+  /// The velocity of a point `arm` away from the centre of mass at a time within an interval, on
+  /// the path that the known impulses and forces give.
   Vector KnownVelocity(size_t interval, double time_s, const Vector& arm) const;
   /// The greatest change of the velocity of any point at a node beyond free flight, m/s.
   double Jump(size_t node) const;

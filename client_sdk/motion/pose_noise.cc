@@ -43,16 +43,18 @@ double NoiseSpeed(const BodyMotion& body, size_t frames) {
   constexpr size_t kWindow = 3, kLeastWindows = 8;
   constexpr double kLeastOpposite = 0.45;
   const std::vector<Change> differences = Differences(body, frames);
-  if (differences.size() < kLeastWindows + kWindow - 1) return 0;
   struct Window {
     double energy = 0, product = 0;
   };
   std::vector<Window> windows;
   for (size_t k = 0; k + kWindow <= differences.size(); ++k) {
     const Change* c = &differences[k];
-    windows.push_back({(c[0].squaredNorm() + c[1].squaredNorm() + c[2].squaredNorm()) / 3,
-                       (c[0].dot(c[1]) + c[1].dot(c[2])) / 2});
+    const Window window = {(c[0].squaredNorm() + c[1].squaredNorm() + c[2].squaredNorm()) / 3,
+                           (c[0].dot(c[1]) + c[1].dot(c[2])) / 2};
+    // FindContacts refuses poses and inertias that are malformed.
+    if (std::isfinite(window.energy)) windows.push_back(window);
   }
+  if (windows.size() < kLeastWindows) return 0;
   // The louder ones may hold impulses.
   std::ranges::sort(windows, {}, &Window::energy);
   windows.resize(windows.size() / 3);

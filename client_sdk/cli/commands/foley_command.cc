@@ -83,8 +83,8 @@ absl::Status CheckSounds(const FoleyScene& foley) {
                  "no body has a material: name one, such as --material '*=oak', or see --list");
 }
 
-/// Leaves so few frames of noisy poses that their noise passes for no contact: a hat function of n
-/// frames takes the noise of a pose for an n-th of the velocity.
+/// Leaves each n-th frame of noisy poses. A hat function of n frames takes the noise of a pose for
+/// an n-th of the velocity, and then for no contact.
 void TakeNoiseOut(motion::MotionScene& scene) {
   const motion::PoseNoise noise = motion::MeasureNoise(scene.motion);
   const size_t apart = noise.frames_apart;

@@ -53,27 +53,15 @@ def render(client, trace):
     return client.render(trace, sample_rate_hz=SAMPLE_RATE_HZ, tail_s=1).mono
 
 
-def poses_of(steps, bodies):
-    """The positions and orientations of each moving body; its handle is its place in the scene."""
-    places = {handle: ([], []) for handle in steps[0].poses.object}
-    for step in steps:
-        positions = numpy.reshape(step.poses.position_m, (-1, 3))
-        orientations = numpy.reshape(step.poses.orientation, (-1, 4))
-        for row, handle in enumerate(step.poses.object):
-            places[handle][0].append(positions[row])
-            places[handle][1].append(orientations[row])
-    handles = sorted(places)
-    assert len(handles) == len(bodies)
-    return {body["name"]: places[handle] for body, handle in zip(bodies, handles)}
-
-
 def find(server, scene, steps):
+    """The contacts of the scene's one body, of which each step has the pose."""
     import carillon.motion
     import falls
-    moving = [body for body in scene["bodies"] if "mass_kg" in body]
-    bodies = {body["name"]: carillon.motion.Body(falls.mesh_of(body, falls.SCENES), body.get("material", "none"),
-                                                 wall=body.get("wall_m"), mass=body["mass_kg"]) for body in moving}
-    return carillon.motion.contacts(bodies, [step.time_s for step in steps], poses_of(steps, moving), floor=0,
+    body = scene["bodies"][1]
+    bodies = {body["name"]: carillon.motion.Body(falls.mesh_of(body, falls.SCENES), body["material"],
+                                                 wall=body["wall_m"], mass=body["mass_kg"])}
+    poses = {body["name"]: tuple(zip(*((step.poses.position_m, step.poses.orientation) for step in steps)))}
+    return carillon.motion.contacts(bodies, [step.time_s for step in steps], poses, floor=0,
                                     friction=1.2 * scene["friction"], server=server)
 
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "client_sdk/motion/find_contacts.h"
@@ -45,11 +46,18 @@ TEST(MeasureNoise, MeasuresWhatWasAdded) {
   for (const int rate : {60, 120, 240}) {
     for (const double noise_m : {2e-5, 1e-4}) {
       const Fall fall = Drop(CornerScene(), falls::FallInBullet, 2400 / rate);
-      const double radius_m = 0.0807775;  // of the box of 12 x 9 x 6 cm
+      // A corner of the box, whose sides are 12, 9 and 6 cm, has this distance from its centre.
+      const double radius_m = 0.0807775;
       const PoseNoise noise = MeasureNoise(Noisy(fall.motion, noise_m, radius_m));
       EXPECT_NEAR(noise.place_m, std::sqrt(2) * noise_m, 0.3 * std::sqrt(2) * noise_m) << rate;
     }
   }
+}
+
+TEST(MeasureNoise, LeavesMalformedPosesToFindContacts) {
+  Fall fall = Drop(CornerScene(), falls::FallInBullet, 20);
+  for (BodyPose& pose : fall.motion.bodies[1].poses) pose.position_m.x() = std::nan("");
+  EXPECT_EQ(MeasureNoise(fall.motion).frames_apart, 1U);
 }
 
 TEST(MeasureNoise, SaysWhereTwentyFramesASecondDoNotSuffice) {
