@@ -231,8 +231,10 @@ void Print(const Arguments& arguments, const std::vector<Stream>& streams,
   for (const auto& [name, share] : quantiles) {
     std::printf(", \"%s_ms\": %.3f", name, 1e3 * Quantile(found.latencies_s, share));
   }
-  std::printf(", \"most_over_ms\": %.3f, \"clock_ppm\": %.1f, \"clock_error_ms\": %.3f",
-              1e3 * found.most_over_s, capture.ClockPpm(), 1e3 * capture.ClockErrorS());
+  std::printf(
+      ", \"most_over_ms\": %.3f, \"shortest_gap_ms\": %.3f, \"clock_ppm\": %.1f, "
+      "\"clock_error_ms\": %.3f",
+      1e3 * found.most_over_s, 1e3 * kShortestGapS, capture.ClockPpm(), 1e3 * capture.ClockErrorS());
   const std::pair<const char*, uint64_t> counts[] = {
       {"strikes", strikes.size()},
       {"late", late_count},

@@ -37,10 +37,13 @@ class LatencyTest(unittest.TestCase):
                   f"{found['late']} of {found['strikes']} late; JACK's clock off by {found['clock_error_ms']:.2f} ms",
                   flush=True)
             missed, xruns = found["missed_cycles"], found["xruns"]
-            if missed + xruns == 0 and found["clock_error_ms"] <= self.period_ms():
+            # A strike that is heard later than the next is due passes for the next.
+            behind_ms = found["most_ms"] - found["stated_ms"]
+            if (missed + xruns == 0 and found["clock_error_ms"] <= self.period_ms()
+                    and behind_ms < found["shortest_gap_ms"]):
                 return found
         self.skipTest(f"too busy for sound here: {missed} cycles of JACK missed, {xruns} xruns of the daemon, "
-                      f"JACK's clock off by {found['clock_error_ms']:.1f} ms")
+                      f"JACK's clock off by {found['clock_error_ms']:.1f} ms, a strike {behind_ms:.1f} ms late")
 
     def assert_as_stated(self, found):
         # All that came in time lie where the daemon says, to the sample; what did not is counted, and may run
