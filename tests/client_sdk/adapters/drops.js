@@ -63,7 +63,8 @@ async function havok(stepS, [w, x, y, z] = FLAT) {
     engine.HP_Body_SetMotionType(body, motion);
     engine.HP_Body_SetQTransform(body, [position, turn]);
     engine.HP_Body_SetMassProperties(body, [[0, 0, 0], MASS_KG, [0.00234, 0.0044, 0.00601], [0, 0, 0, 1]]);
-    engine.HP_Body_SetEventMask(body, Contacts.eventMask(engine));
+    // Those that have finished, too, which the adapter must leave out.
+    engine.HP_Body_SetEventMask(body, Contacts.eventMask(engine) | engine.EventType.COLLISION_FINISHED.value);
     engine.HP_Body_SetLinearDamping(body, 0);
     engine.HP_Body_SetActivationControl(body, engine.ActivationControl.ALWAYS_ACTIVE);
     engine.HP_World_AddBody(world, body, false);
@@ -83,7 +84,9 @@ async function havok(stepS, [w, x, y, z] = FLAT) {
     engine.HP_World_RemoveBody(world, body);
     engine.HP_Body_Release(body);
   };
-  return { step, remove, momentum: () => engine.HP_Body_GetLinearVelocity(body)[1].map((speed) => MASS_KG * speed) };
+  const turn = (speed) => engine.HP_Body_SetAngularVelocity(body, speed);
+  return { step, remove, turn, contacts,
+    momentum: () => engine.HP_Body_GetLinearVelocity(body)[1].map((speed) => MASS_KG * speed) };
 }
 
 async function cannon(stepS, [w, x, y, z] = FLAT) {
