@@ -4,24 +4,26 @@
 
     table2.py CARILLON_PRECOMPUTE [--notes D3,E3] [--quadratic-only]
 
-Every chime goes the way of a user: its surface as an OBJ file through carillon-precompute. Prints a
-Markdown table of base frequencies. Exits with 1 where a
-frequency with quadratic elements is off by more than 0.5 % from Timoshenko's beam or from a mesh twice
-as fine, or by more than 2 % from the measured column, or where one with linear elements at about the
-paper's number of nodes is off by more than 1.5 % from the computed column.
+Every chime goes the way of a user: its surface as an OBJ file through carillon-precompute. Prints a Markdown table of
+base frequencies. Exits with 1 where a frequency with quadratic elements is off by more than 0.5 % from Timoshenko's
+beam or from a mesh twice as fine, or by more than 2 % from the measured column, or where one with linear elements at
+about the paper's number of nodes is off by more than 1.5 % from the computed column.
 """
 
 import argparse
-import json
 import math
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-# Table 2: note, measured length in m, measured and computed base frequency in Hz.
-CHIMES = [("D3", .505, 585.8, 589.17), ("E3", .475, 656.0, 665.03), ("G3", .435, 781.8, 787.01),
-          ("A4", .410, 877.5, 884.70), ("B4", .388, 982.5, 984.75), ("D4", .353, 1167.0, 1186.88)]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "decomposition"))
+import bench  # noqa: E402
+import bodies  # noqa: E402
+
+# Table 2: ideal Hz, measured length in m and Hz, computed Hz, adjusted length in m and Hz.
+CHIMES = {"D3": (587.33, .505, 585.8, 589.17, .5061, 587.40), "E3": (659.26, .475, 656., 665.03, .4770, 659.27),
+          "G3": (783.99, .435, 781.8, 787.01, .4366, 784.06), "A4": (880., .410, 877.5, 884.70, .4115, 879.36),
+          "B4": (987.77, .388, 982.5, 984.75, .3878, 987.32), "D4": (1174.66, .353, 1167., 1186.88, .3548, 1174.67)}
 OUTER_RADIUS_M, WALL_M = .0125, .001
 LAMBDA_PA, MU_PA, DENSITY = 4.98e10, 2.57e10, 2700.
 YOUNG_PA = MU_PA * (3 * LAMBDA_PA + 2 * MU_PA) / (LAMBDA_PA + MU_PA)
@@ -35,8 +37,7 @@ def timoshenko_hz(length):
     area = math.pi * (OUTER_RADIUS_M**2 - inner**2)
     second_moment = math.pi / 4 * (OUTER_RADIUS_M**4 - inner**4)
     m2 = (inner / OUTER_RADIUS_M)**2
-    kappa = 6 * (1 + POISSON) * (1 + m2)**2 / (
-        (7 + 6 * POISSON) * (1 + m2)**2 + (20 + 12 * POISSON) * m2)
+    kappa = 6 * (1 + POISSON) * (1 + m2)**2 / ((7 + 6 * POISSON) * (1 + m2)**2 + (20 + 12 * POISSON) * m2)
     shear = kappa * MU_PA
 
     def equation(omega):
@@ -49,8 +50,7 @@ def timoshenko_hz(length):
         return ((alpha**2 + q) * math.tan(beta * length / 2) / beta
                 + (beta**2 - q) * math.tanh(alpha * length / 2) / alpha)
 
-    high = (4.730040744862704 / length)**2 * math.sqrt(
-        YOUNG_PA * second_moment / (DENSITY * area))
+    high = (4.730040744862704 / length)**2 * math.sqrt(YOUNG_PA * second_moment / (DENSITY * area))
     low = .6 * high
     for _ in range(100):
         middle = (low + high) / 2
@@ -58,49 +58,13 @@ def timoshenko_hz(length):
     return low / (2 * math.pi)
 
 
-def write_tube(path, length, around, along):
-    """The closed surface of the tube; its polygons have the areas of the circles they stand for, since
-    one inscribed in the circle would be a smaller tube."""
-    scale = math.sqrt(2 * math.pi / around / math.sin(2 * math.pi / around))
-    outer, inner = OUTER_RADIUS_M * scale, (OUTER_RADIUS_M - WALL_M) * scale
-    lines = []
-    for radius in (outer, inner):
-        for k in range(along + 1):
-            for i in range(around):
-                angle = 2 * math.pi * i / around
-                lines.append(f"v {radius * math.cos(angle):.15g} {radius * math.sin(angle):.15g} "
-                             f"{length * k / along:.15g}")
-
-    def vertex(wall, k, i):
-        return wall * (along + 1) * around + k * around + i % around + 1
-
-    def quad(a, b, c, d):
-        lines.append(f"f {a} {b} {c}")
-        lines.append(f"f {a} {c} {d}")
-
-    for i in range(around):
-        for k in range(along):
-            quad(vertex(0, k, i), vertex(0, k, i + 1), vertex(0, k + 1, i + 1), vertex(0, k + 1, i))
-            quad(vertex(1, k, i), vertex(1, k + 1, i), vertex(1, k + 1, i + 1), vertex(1, k, i + 1))
-        quad(vertex(0, 0, i), vertex(1, 0, i), vertex(1, 0, i + 1), vertex(0, 0, i + 1))
-        quad(vertex(0, along, i), vertex(0, along, i + 1), vertex(1, along, i + 1),
-             vertex(1, along, i))
-    path.write_text("\n".join(lines) + "\n")
-
-
-def solve(program, length, element, around, along):
+def solve(build, length, element, around, along):
     """Base frequency in Hz, number of nodes and CPU seconds."""
     with tempfile.TemporaryDirectory() as folder:
         surface = pathlib.Path(folder, "tube.obj")
-        write_tube(surface, length, around, along)
-        run = subprocess.run(
-            [program, str(surface), "--out", str(pathlib.Path(folder, "tube.modes")), "--json",
-             "--element", element, "--keep-surface", "--young", str(YOUNG_PA), "--poisson", str(POISSON),
-             "--density", str(DENSITY), "--band", "20:2500"],
-            stdout=subprocess.PIPE, check=False)
-    report = json.loads(run.stdout)
-    if run.returncode != 0:
-        sys.exit(f"{report['error']}")
+        bodies.write_obj(surface, *bodies.tube(length, around, along, OUTER_RADIUS_M, WALL_M))
+        report = bench.decompose(build, surface, surface.with_suffix(".model"), "--element", element, "--keep-surface",
+                                 "--young", YOUNG_PA, "--poisson", POISSON, "--density", DENSITY, "--band", "20:2500")
     cpu = sum(phase["cpu_seconds"] for phase in report["phases"])
     return report["modes"][0]["frequency_hz"], report["nodes"], cpu
 
@@ -115,33 +79,34 @@ def off(value, reference, limit_percent):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("program")
-    parser.add_argument("--notes", default="D3,E3,G3,A4,B4,D4")
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("--notes", type=bench.names, default=list(CHIMES))
     parser.add_argument("--quadratic-only", action="store_true")
     options = parser.parse_args()
-    chimes = [chime for chime in CHIMES if chime[0] in options.notes.split(",")]
+    build = options.program.resolve().parents[1]
     failed = False
 
-    print("| note | length m | quadratic Hz (nodes, CPU s) | Timoshenko Hz | twice as fine Hz (nodes) "
-          "| measured Hz |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for note, length, measured, _ in chimes:
+    bench.print_head("note", "length m", "quadratic Hz (nodes, CPU s)", "Timoshenko Hz", "twice as fine Hz (nodes)",
+                     "measured Hz")
+    for note in options.notes:
+        _, length, measured, *_ = CHIMES[note]
         along = round(length * 100)
-        coarse, coarse_nodes, cpu = solve(options.program, length, "quadratic", 16, along)
-        fine, fine_nodes, _ = solve(options.program, length, "quadratic", 32, 2 * along)
+        coarse, coarse_nodes, cpu = solve(build, length, "quadratic", 16, along)
+        fine, fine_nodes, _ = solve(build, length, "quadratic", 32, 2 * along)
         theory = timoshenko_hz(length)
         failed |= off(coarse, theory, .5) or off(coarse, fine, .5) or off(coarse, measured, 2)
-        print(f"| {note} | {length} | {coarse:.2f} ({coarse_nodes}, {cpu:.1f}) "
-              f"| {theory:.2f} ({percent(coarse, theory)}) "
-              f"| {fine:.2f} ({fine_nodes}; {percent(coarse, fine)}) "
-              f"| {measured} ({percent(coarse, measured)}) |", flush=True)
+        bench.print_row(note, length, f"{coarse:.2f} ({coarse_nodes}, {cpu:.1f})",
+                        f"{theory:.2f} ({percent(coarse, theory)})",
+                        f"{fine:.2f} ({fine_nodes}; {percent(coarse, fine)})",
+                        f"{measured} ({percent(coarse, measured)})")
     if not options.quadratic_only:
-        print("\n| note | linear Hz (nodes, CPU s) | computed in the paper Hz |\n| --- | --- | --- |")
-        for note, length, _, computed in chimes:
-            linear, nodes, cpu = solve(options.program, length, "linear", 48, 195)
+        print()
+        bench.print_head("note", "linear Hz (nodes, CPU s)", "computed in the paper Hz")
+        for note in options.notes:
+            _, length, _, computed, *_ = CHIMES[note]
+            linear, nodes, cpu = solve(build, length, "linear", 48, 195)
             failed |= off(linear, computed, 1.5)
-            print(f"| {note} | {linear:.2f} ({nodes}, {cpu:.1f}) "
-                  f"| {computed} ({percent(linear, computed)}) |", flush=True)
+            bench.print_row(note, f"{linear:.2f} ({nodes}, {cpu:.1f})", f"{computed} ({percent(linear, computed)})")
     return 1 if failed else 0
 
 

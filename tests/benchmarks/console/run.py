@@ -7,7 +7,6 @@ was killed.
 The daemon has the null device, so that the page plays. measure.js drives the browser.
 """
 
-import argparse
 import contextlib
 import json
 import os
@@ -15,11 +14,14 @@ import pathlib
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+import numpy
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
+
 HERE = pathlib.Path(__file__).resolve().parent
 NAMES = ("first", "clicks", "scene", "large", "restart")
 LARGE = (250, 400, 800)  # vertices along and around, modes
@@ -27,7 +29,6 @@ LARGE = (250, 400, 800)  # vertices along and around, modes
 
 def large_model(file):
     """A spindle of 100,000 vertices whose 800 shapes are waves along and around it; no body, but as large as one."""
-    import numpy
     along, around, modes = LARGE
     u, v = numpy.meshgrid(numpy.linspace(0, 1, along), numpy.arange(around) * 2 * numpy.pi / around, indexing="ij")
     radius = 0.02 + 0.05 * numpy.sin(numpy.pi * u)
@@ -52,7 +53,6 @@ def large_model(file):
 
 def as_stl(mesh):
     """An OBJ file's triangles as a binary STL file."""
-    import numpy
     rows = [line.split() for line in mesh.decode().splitlines()]
     vertices = numpy.array([row[1:4] for row in rows if row and row[0] == "v"], numpy.float32)
     faces = numpy.array([[int(word.split("/")[0]) - 1 for word in row[1:4]] for row in rows if row and row[0] == "f"])
@@ -123,42 +123,31 @@ class Browser:
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser = bench.parser(__doc__)
     parser.add_argument("--seconds", type=int, default=600, help="how long the scene sounds")
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, help="large needs 2 GB in /tmp")
     options = parser.parse_args()
-    build = options.build.resolve()
-    sys.path[:0] = [str(build / "client_sdk/python"), str(ROOT / "client_sdk/python"), str(ROOT / "tests/integration")]
-    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
-    # They need the paths above.
-    import meshes
-    from daemon import Daemon
-    with tempfile.TemporaryDirectory(prefix="carillon-console-") as name:
-        folder = pathlib.Path(name)
-        bar, bowl = folder / "bar.obj", folder / "bowl.stl"
+    bench.use(options.build)
+    import meshes  # needs the paths of `use`
+    with bench.daemon() as daemon:
+        bar, bowl, large = (daemon.folder / name for name in ("bar.obj", "bowl.stl", "large.npz"))
         bar.write_bytes(meshes.bar())
         bowl.write_bytes(as_stl(meshes.bowl()))
-        daemon = Daemon(folder)
-        browser = Browser(build, daemon)
-        try:
-            if "first" in options.only:
-                browser.print_all("first", MESH=bowl)
-            if "clicks" in options.only:
-                browser.print_all("clicks", MESH=bar)
-            if "scene" in options.only:
-                with simulator(daemon.server, bar):
-                    browser.print_all("scene", SECONDS=options.seconds)
-            if "large" in options.only:
-                large_model(folder / "large.npz")
-                daemon.command("model", "import", "--label", "large", "--material", "structural_steel",
-                               folder / "large.npz")
-                browser.print_all("large")
-            if "restart" in options.only:
-                with restarted(daemon):
-                    browser.print_all("restart", MESH=bar)
-        finally:
-            daemon.stop()
+        browser = Browser(options.build, daemon)
+        if "first" in options.only:
+            browser.print_all("first", MESH=bowl)
+        if "clicks" in options.only:
+            browser.print_all("clicks", MESH=bar)
+        if "scene" in options.only:
+            with simulator(daemon.server, bar):
+                browser.print_all("scene", SECONDS=options.seconds)
+        if "large" in options.only:
+            large_model(large)
+            daemon.command("model", "import", "--label", "large", "--material", "structural_steel", large)
+            browser.print_all("large")
+        if "restart" in options.only:
+            with restarted(daemon):
+                browser.print_all("restart", MESH=bar)
 
 
 if __name__ == "__main__":

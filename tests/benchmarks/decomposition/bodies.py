@@ -4,7 +4,6 @@
 import math
 
 import numpy
-import pyopenvdb
 
 BUNNY = "/usr/share/glmark2/models/bunny.obj"  # crosses itself, so that no mesher takes it
 
@@ -86,29 +85,39 @@ def bell(around=32):
     return lathe([(.001 * r, .001 * z) for r, z in numpy.concatenate([outer, inner])], around)
 
 
-def box(size, cells):
-    """Twelve faces cut into cells; vertices on edges are shared."""
+def union(xs, ys, zs, full):
+    """The boundary of the grid cells for whose indices (i, j, k) `full` is true; the planes are in metres."""
+    planes, count = (xs, ys, zs), (len(xs) - 1, len(ys) - 1, len(zs) - 1)
     number, vertices, triangles = {}, [], []
 
-    def vertex(point):
-        if point not in number:
-            number[point] = len(vertices)
-            vertices.append([size[a] * point[a] / cells[a] for a in range(3)])
-        return number[point]
+    def vertex(index):
+        if index not in number:
+            number[index] = len(vertices)
+            vertices.append([planes[a][index[a]] for a in range(3)])
+        return number[index]
+
+    def place(axis, *indices):
+        """The indices along an axis and the two after it, in the order of the axes."""
+        return tuple(indices[(a - axis) % 3] for a in range(3))
+
+    def inside(cell):
+        return all(0 <= cell[a] < count[a] for a in range(3)) and full(*cell)
 
     for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for side in (0, cells[axis]):
-            for i in range(cells[u]):
-                for j in range(cells[v]):
-                    corners = []
-                    for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
-                        point = [0, 0, 0]
-                        point[axis], point[u], point[v] = side, i + du, j + dv
-                        corners.append(vertex(tuple(point)))
-                    a, b, c, d = corners if side else corners[::-1]
-                    triangles.extend([(a, b, c), (a, c, d)])
+        for side in range(count[axis] + 1):
+            for i, j in numpy.ndindex(count[(axis + 1) % 3], count[(axis + 2) % 3]):
+                before, after = (inside(place(axis, layer, i, j)) for layer in (side - 1, side))
+                if before == after:
+                    continue
+                corners = [vertex(place(axis, side, i + u, j + v)) for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+                a, b, c, d = corners if before else corners[::-1]
+                triangles.extend([(a, b, c), (a, c, d)])
     return numpy.array(vertices), triangles
+
+
+def box(size, cells):
+    """Faces cut into cells; vertices on edges are shared."""
+    return union(*([side * i / count for i in range(count + 1)] for side, count in zip(size, cells)), lambda *_: True)
 
 
 def read_bunny(size):
@@ -135,6 +144,7 @@ def isosurface(distance, value, inward):
 def bunny(size, spacing, wall=0.0):
     """The bunny anew, as an isosurface of its signed distance with vertices `spacing` metres apart; hollow
     where it has a wall."""
+    import pyopenvdb  # the other bodies need it not
     vertices, triangles = read_bunny(size)
     distance = pyopenvdb.FloatGrid.createLevelSetFromPolygons(
         vertices, triangles=triangles, transform=pyopenvdb.createLinearTransform(spacing),

@@ -12,6 +12,7 @@ import time
 import numpy
 import scipy.sparse
 
+import bench
 import bodies
 import compare
 import solutions
@@ -19,14 +20,10 @@ import solutions
 MAX_DIFFERENCE = 1e-4
 
 BODIES = [
-    compare.Body("chime", lambda: bodies.tube(.505, 24, 80), "linear", "consistent",
-                 compare.ALUMINIUM),
-    compare.Body("chime", lambda: bodies.tube(.505, 16, 50), "quadratic", "consistent",
-                 compare.ALUMINIUM),
-    compare.Body("bunny", lambda: bodies.bunny(.08, .08 / 28), "linear", "consistent",
-                 compare.CERAMIC),
-    compare.Body("bunny", lambda: bodies.bunny(.08, .08 / 21), "quadratic", "consistent",
-                 compare.CERAMIC),
+    compare.Body("chime", lambda: bodies.tube(.505, 24, 80), "linear", "consistent", compare.ALUMINIUM),
+    compare.Body("chime", lambda: bodies.tube(.505, 16, 50), "quadratic", "consistent", compare.ALUMINIUM),
+    compare.Body("bunny", lambda: bodies.bunny(.08, .08 / 28), "linear", "consistent", compare.CERAMIC),
+    compare.Body("bunny", lambda: bodies.bunny(.08, .08 / 21), "quadratic", "consistent", compare.CERAMIC),
 ]
 
 NODES = {"linear": 4, "quadratic": 10}
@@ -122,14 +119,14 @@ def compare_on(body, folder, options, environment):
     complete = len(theirs) == len(ours)
     worst = difference(ours, theirs)
     verdict = "" if complete and worst <= MAX_DIFFERENCE else " (too large)"
-    print(f"| {body.name}, {body.element} | {len(read_mesh(folder, body)[0])} | {len(ours)} "
-          f"| {ours[0]:.3f} | {theirs[0]:.3f} | {worst:.1e}{verdict} | {difference(exact, theirs):.1e} "
-          f"| {our_seconds:.2f} | {seconds:.2f} |", flush=True)
+    bench.print_row(f"{body.name}, {body.element}", len(read_mesh(folder, body)[0]), len(ours), f"{ours[0]:.3f}",
+                    f"{theirs[0]:.3f}", f"{worst:.1e}{verdict}", f"{difference(exact, theirs):.1e}",
+                    f"{our_seconds:.2f}", f"{seconds:.2f}")
 
 
 def compare_frequencies(options, folder, environment):
-    print("| body | nodes | modes | first, Carillon Hz | first, CalculiX Hz | largest difference of any "
-          "| with exact mass | Carillon s | CalculiX s |\n" + "| --- " * 9 + "|", flush=True)
+    bench.print_head("body", "nodes", "modes", "first, Carillon Hz", "first, CalculiX Hz",
+                     "largest difference of any", "with exact mass", "Carillon s", "CalculiX s")
     for number, body in enumerate(BODIES):
         slow = body is BODIES[-1] and not options.full
         if slow or (options.only and body.name not in options.only):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from typing import Callable
 
+import bench
 import bodies
 import solutions
 
@@ -93,9 +94,9 @@ def row(body, label, times, checked, ours):
     ratio = times["cpu_seconds"] / ours["cpu_seconds"]
     spread = abs(checked.frequencies_hz / ours["frequencies_hz"] - 1).max()
     verdict = "" if checked.max_residual <= MAX_RESIDUAL else " (too large)"
-    print(f"| {body.name} | {label} | {len(checked.frequencies_hz)} | {times['cpu_seconds']:.2f} "
-          f"| {ratio:.1f} | {times['seconds']:.2f} | {checked.max_residual:.1e}{verdict} "
-          f"| {checked.max_orthogonality_error:.0e} | {spread:.0e} |", flush=True)
+    bench.print_row(body.name, label, len(checked.frequencies_hz), f"{times['cpu_seconds']:.2f}", f"{ratio:.1f}",
+                    f"{times['seconds']:.2f}", f"{checked.max_residual:.1e}{verdict}",
+                    f"{checked.max_orthogonality_error:.0e}", f"{spread:.0e}")
 
 
 def compare_on(body, folder, options, environment):
@@ -120,18 +121,18 @@ def compare_on(body, folder, options, environment):
         times = run([*peer.command, folder, len(ours["frequencies_hz"]) + 6, SHIFT, peer.tolerance],
                     environment, body.runs)
         if times is None:
-            print(f"| {body.name} | {peer.label} | failed |", flush=True)
+            bench.print_row(body.name, peer.label, "failed")
             continue
         checked = solutions.check(folder, K, M, LOW_HZ, HIGH_HZ)
         if len(checked.frequencies_hz) != len(ours["frequencies_hz"]):
-            print(f"| {body.name} | {peer.label} | {len(checked.frequencies_hz)} modes |", flush=True)
+            bench.print_row(body.name, peer.label, f"{len(checked.frequencies_hz)} modes")
             continue
         row(body, peer.label, times, checked, ours)
 
 
 def compare(options, folder, environment):
-    print("| body | program | modes | CPU s | times Carillon's | wall s | largest residual "
-          "| M-orthogonal to | frequencies within |\n" + "| --- " * 9 + "|", flush=True)
+    bench.print_head("body", "program", "modes", "CPU s", "times Carillon's", "wall s", "largest residual",
+                     "M-orthogonal to", "frequencies within")
     for body in BODIES:
         if options.only and body.name not in options.only:
             continue

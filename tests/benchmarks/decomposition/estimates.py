@@ -2,60 +2,20 @@
 """Stated errors of frequencies beside true ones, on nineteen bodies: six have re-entrant corners, and seven are
 thin and flat."""
 
-import dataclasses
 import math
-import os
-import pathlib
 import sys
-from typing import Callable
 
+import bench
 import bodies
 import measured
 import numpy
 import pairing
 import users
 
-ROOT = pathlib.Path(__file__).parents[3]
 FINER, MOST_NODES, MOST_SECONDS = 4, 300_000, 1200
 # Below a cent, which nobody hears, an error is not judged.
 SMALLEST_ERROR = 5.8e-4
 GOALS = {"defaults": (), "3 %": ("--accuracy", "3%"), "1 %": ("--accuracy", "1%")}
-
-
-def union(xs, ys, zs, full):
-    """The boundary of the grid cells for whose indices (i, j, k) `full` is true; the planes are in metres."""
-    planes, count = (xs, ys, zs), (len(xs) - 1, len(ys) - 1, len(zs) - 1)
-    number, vertices, triangles = {}, [], []
-
-    def vertex(index):
-        if index not in number:
-            number[index] = len(vertices)
-            vertices.append([planes[a][index[a]] for a in range(3)])
-        return number[index]
-
-    def inside(cell):
-        return all(0 <= cell[a] < count[a] for a in range(3)) and full(*cell)
-
-    for cell in numpy.ndindex(*count):
-        if not full(*cell):
-            continue
-        for axis in range(3):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            for side in (0, 1):
-                other = list(cell)
-                other[axis] += 2 * side - 1
-                if inside(other):
-                    continue
-                corners = []
-                for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
-                    index = list(cell)
-                    index[axis] += side
-                    index[u] += du
-                    index[v] += dv
-                    corners.append(vertex(tuple(index)))
-                a, b, c, d = corners if side else corners[::-1]
-                triangles.extend([(a, b, c), (a, c, d)])
-    return numpy.array(vertices), triangles
 
 
 def millimetres(*values):
@@ -63,8 +23,8 @@ def millimetres(*values):
 
 
 def l_profile():
-    return union(millimetres(0, 4, 30), millimetres(0, 4, 30), millimetres(0, 60, 120),
-                 lambda i, j, k: i == 0 or j == 0)
+    return bodies.union(millimetres(0, 4, 30), millimetres(0, 4, 30), millimetres(0, 60, 120),
+                        lambda i, j, k: i == 0 or j == 0)
 
 
 def filleted_l_profile(length=.12, leg=.03, wall=.004, fillet=.002, steps=6):
@@ -76,8 +36,8 @@ def filleted_l_profile(length=.12, leg=.03, wall=.004, fillet=.002, steps=6):
 
 
 def fork():
-    return union(millimetres(0, 4, 10, 14), millimetres(0, 30, 36, 120), millimetres(0, 4),
-                 lambda i, j, k: i in (0, 2) and j == 2 or j == 1 or i == 1 and j == 0)
+    return bodies.union(millimetres(0, 4, 10, 14), millimetres(0, 30, 36, 120), millimetres(0, 4),
+                        lambda i, j, k: i in (0, 2) and j == 2 or j == 1 or i == 1 and j == 0)
 
 
 def stepped_shaft():
@@ -87,47 +47,40 @@ def stepped_shaft():
 
 def frame():
     """A plate with a square hole."""
-    return union(millimetres(0, 30, 60, 90), millimetres(0, 30, 60, 90), millimetres(0, 4),
-                 lambda i, j, k: (i, j) != (1, 1))
+    return bodies.union(millimetres(0, 30, 60, 90), millimetres(0, 30, 60, 90), millimetres(0, 4),
+                        lambda i, j, k: (i, j) != (1, 1))
 
 
 def perforated_plate():
     """Square holes of 20 mm in cells of 30 mm."""
     xs, ys = ([*(.001 * (30 * i + x) for i in range(count) for x in (0, 5, 25)), .03 * count] for count in (6, 4))
-    return union(xs, ys, millimetres(0, 2), lambda i, j, k: not i % 3 == j % 3 == 1)
+    return bodies.union(xs, ys, millimetres(0, 2), lambda i, j, k: not i % 3 == j % 3 == 1)
 
 
 def disc(inner, outer, thickness, around):
     return bodies.lathe([(inner, 0), (outer, 0), (outer, thickness), (inner, thickness)], around)
 
 
-@dataclasses.dataclass
-class Body:
-    name: str
-    surface: Callable
-    material: str = "structural_steel"
-
-
 BODIES = [
-    Body("bar", users.block(.2, .03, .02)),
-    Body("plate", users.block(.3, .2, .003)),
-    Body("bowl", lambda: bodies.bowl(.08, .003, 64, 24)),
-    Body("bell", bodies.bell, "bell_bronze"),
-    Body("chime", lambda: bodies.tube(.505, 24, 120), "chime_aluminum"),
-    Body("bunny", lambda: bodies.bunny(.15, .15 / 28), "bunny_ceramic"),
-    Body("L profile", l_profile),
-    Body("L profile, fillet", filleted_l_profile),
-    Body("fork", fork),
-    Body("stepped shaft", stepped_shaft),
-    Body("frame", frame),
-    Body("gear", lambda: users.gear(teeth=12, inner=.03, outer=.04, height=.008)),
-    Body("disc, 1 mm", lambda: disc(0, .08, .001, 64)),
-    Body("disc, 2 mm", lambda: disc(0, .1, .002, 48)),
-    Body("ring", lambda: disc(.05, .1, .002, 48)),
-    Body("slat", users.block(.2, .02, .001)),
-    Body("square plate", users.block(.1, .1, .001)),
-    Body("perforated plate", perforated_plate),
-    Body("triangular plate", lambda: users.prism([(.1, 0), (-.05, .08), (-.05, -.08)], .0015)),
+    users.Body("bar", users.block(.2, .03, .02)),
+    users.Body("plate", users.block(.3, .2, .003)),
+    users.Body("bowl", lambda: bodies.bowl(.08, .003, 64, 24)),
+    users.Body("bell", bodies.bell, "bell_bronze"),
+    users.Body("chime", lambda: bodies.tube(.505, 24, 120), "chime_aluminum"),
+    users.Body("bunny", lambda: bodies.bunny(.15, .15 / 28), "bunny_ceramic"),
+    users.Body("L profile", l_profile),
+    users.Body("L profile, fillet", filleted_l_profile),
+    users.Body("fork", fork),
+    users.Body("stepped shaft", stepped_shaft),
+    users.Body("frame", frame),
+    users.Body("gear", lambda: users.gear(teeth=12, inner=.03, outer=.04, height=.008)),
+    users.Body("disc, 1 mm", lambda: disc(0, .08, .001, 64)),
+    users.Body("disc, 2 mm", lambda: disc(0, .1, .002, 48)),
+    users.Body("ring", lambda: disc(.05, .1, .002, 48)),
+    users.Body("slat", users.block(.2, .02, .001)),
+    users.Body("square plate", users.block(.1, .1, .001)),
+    users.Body("perforated plate", perforated_plate),
+    users.Body("triangular plate", lambda: users.prism([(.1, 0), (-.05, .08), (-.05, -.08)], .0015)),
 ]
 
 
@@ -143,7 +96,7 @@ class Solver:
                                   self.options, self.environment, MOST_SECONDS, out)
         if run.verdict != "model":
             sys.exit(f"{self.body.name}, {name}: {run.report['error']['message']}")
-        return run.report, pairing.read_arrays(out), run.cpu_seconds
+        return run.report, bench.read_model(out)[1], run.cpu_seconds
 
     def finer(self, nodes):
         """A mesh of four times the nodes. Its band is stated, so that it has all modes whatever they cost."""
@@ -163,31 +116,27 @@ def errors(ours, finer):
 def row(body, goal, ours, finer):
     stated, true = errors(ours, finer)
     report, _, cpu_seconds = ours
-    beginning = (f"| {body.name} | {goal} | {report['nodes']} | {finer[0]['nodes']} "
-                 f"| {len(true)} of {len(report['modes'])} | {cpu_seconds:.1f} ")
-    if not len(true):
-        print(beginning + "| | | | |", flush=True)
-        return stated, true
-    ratios = stated / true
-    print(f"{beginning}| {100 * stated.max():.2f} % | {100 * true.max():.2f} % "
-          f"| {ratios.min():.2f}, {numpy.median(ratios):.2f}, {ratios.max():.2f} | {numpy.sum(ratios >= 1)} |",
-          flush=True)
+    found = [""] * 4
+    if len(true):
+        ratios = stated / true
+        found = [f"{100 * stated.max():.2f} %", f"{100 * true.max():.2f} %",
+                 f"{ratios.min():.2f}, {numpy.median(ratios):.2f}, {ratios.max():.2f}", numpy.sum(ratios >= 1)]
+    bench.print_row(body.name, goal, report["nodes"], finer[0]["nodes"], f"{len(true)} of {len(report['modes'])}",
+                    f"{cpu_seconds:.1f}", *found)
     return stated, true
 
 
 def estimates(options, folder, environment):
-    os.environ["CARILLON_BIN_DIR"] = str(options.build / "bin")
-    sys.path[:0] = [str(options.build / "client_sdk/python"), str(ROOT / "client_sdk/python"),
-                    str(ROOT / "tests/integration")]
-    print("| body | goal | nodes | nodes of the finer mesh | modes compared | CPU s | largest stated error "
-          "| largest true error | stated over true: least, median, most | modes within their bar |\n"
-          + "| --- " * 10 + "|", flush=True)
+    bench.use(options.build)
+    bench.print_head("body", "goal", "nodes", "nodes of the finer mesh", "modes compared", "CPU s",
+                     "largest stated error", "largest true error", "stated over true: least, median, most",
+                     "modes within their bar")
     found = {goal: [] for goal in GOALS}
     for number, body in enumerate(BODIES):
         if options.only and body.name not in options.only:
             continue
         surface = folder / f"{number}.obj"
-        bodies.write_obj(surface, *body.surface())
+        bodies.write_obj(surface, *body.source())
         solver = Solver(body, surface, options, environment)
         runs = {goal: solver.run(str(n), *arguments) for n, (goal, arguments) in enumerate(GOALS.items())}
         finer = solver.finer(max(report["nodes"] for report, _, _ in runs.values()))

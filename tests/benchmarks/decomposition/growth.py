@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How time and memory grow with the mesh: a tube and a solid, from surface to model."""
 
-import json
 import math
-import subprocess
 
+import bench
 import bodies
 import compare
 
@@ -30,12 +29,9 @@ def measure(surface, nodes, material, folder, options, environment):
     """The report of carillon-precompute."""
     bodies.write_obj(folder / "surface.obj", *surface())
     young, poisson, density = material
-    run = subprocess.run(
-        [options.build / "bin/carillon-precompute", folder / "surface.obj", "--out", folder / "model",
-         "--json", "--element", "linear", "--mass", "lumped", "--keep-surface", "--nodes", str(nodes),
-         "--young", str(young), "--poisson", str(poisson), "--density", str(density)],
-        stdout=subprocess.PIPE, env=environment, check=False)
-    return json.loads(run.stdout)
+    return bench.decomposed(options.build, folder / "surface.obj", folder / "model", "--element", "linear", "--mass",
+                            "lumped", "--keep-surface", "--nodes", nodes, "--young", young, "--poisson", poisson,
+                            "--density", density, env=environment)
 
 
 def print_family(name, sizes, material, folder, options, environment):
@@ -45,7 +41,7 @@ def print_family(name, sizes, material, folder, options, environment):
             continue
         report = measure(surface, nodes, material, folder, options, environment)
         if "error" in report:
-            print(f"| {name} | {report['error']['message']} |", flush=True)
+            bench.print_row(name, report["error"]["message"])
             continue
         cpu = {phase["name"]: phase["cpu_seconds"] for phase in report["phases"]}
         total = sum(cpu.values())
@@ -54,15 +50,14 @@ def print_family(name, sizes, material, folder, options, environment):
         if before:
             exponent = f"{math.log(total / before[1]) / math.log(report['nodes'] / before[0]):.2f}"
         before = (report["nodes"], total)
-        times = " | ".join(f"{cpu[phase]:.1f}" for phase in PHASES)
-        print(f"| {name} | {report['nodes']} | {len(report['modes'])} | {times} | {total:.1f} | {wall:.1f} "
-              f"| {exponent} | {report['peak_memory_bytes'] / 2**30:.2f} |", flush=True)
+        times = [f"{cpu[phase]:.1f}" for phase in PHASES]
+        bench.print_row(name, report["nodes"], len(report["modes"]), *times, f"{total:.1f}", f"{wall:.1f}", exponent,
+                        f"{report['peak_memory_bytes'] / 2**30:.2f}")
 
 
 def growth(options, folder, environment):
-    print("| body | nodes | modes | " + " | ".join(f"{phase} CPU s" for phase in PHASES)
-          + " | all CPU s | wall s | exponent | peak GiB |\n" + "| --- " * (len(PHASES) + 7) + "|",
-          flush=True)
+    bench.print_head("body", "nodes", "modes", *(f"{phase} CPU s" for phase in PHASES), "all CPU s", "wall s",
+                     "exponent", "peak GiB")
     for name, sizes, material in (("tube", TUBES, compare.ALUMINIUM), ("cube", CUBES, compare.CERAMIC)):
         if not options.only or name in options.only:
             print_family(name, sizes, material, folder, options, environment)

@@ -14,6 +14,7 @@ import json
 import pathlib
 import subprocess
 
+import bench
 import measured
 import numpy
 
@@ -108,10 +109,11 @@ def summarize(records):
     share = models / len(held)
     print(f"\n{models} of {len(held)} closed or nearly closed surfaces end in a model: {100 * share:.1f} %"
           + ("" if share >= LEAST_SHARE else f" (goal: {100 * LEAST_SHARE:g} %)"))
-    print("\n| verdict | files | with a remedy named |\n| --- | --- | --- |")
+    print()
+    bench.print_head("verdict", "files", "with a remedy named")
     for verdict, count in collections.Counter(r["verdict"] for r in held).most_common():
         remedies = sum(r["remedy"] for r in held if r["verdict"] == verdict)
-        print(f"| {verdict} | {count} | {'' if verdict == 'model' else remedies} |")
+        bench.print_row(verdict, count, "" if verdict == "model" else remedies)
     for name, unit, most in (("cpu_seconds", "CPU s", None), ("wall_seconds", "s", MOST_SECONDS),
                              ("peak_gib", "GiB", MOST_GIB)):
         worst = max(held, key=lambda r: r[name])
@@ -124,8 +126,7 @@ def packages(options, folder, environment):
     computed again."""
     records = load(options.results)
     known = {r["file"] for r in records}
-    print("| file | triangles | verdict | nodes | modes | CPU s | wall s | peak GiB |\n" + "| --- " * 8 + "|",
-          flush=True)
+    bench.print_head("file", "triangles", "verdict", "nodes", "modes", "CPU s", "wall s", "peak GiB")
     for path in model_files():
         if str(path) in known or (options.only and path.name not in options.only):
             continue
@@ -135,7 +136,7 @@ def packages(options, folder, environment):
             with open(options.results, "a", encoding="utf-8") as file:
                 file.write(json.dumps(record) + "\n")
         if not record["left_out"]:
-            print(f"| {path.name} | {record['triangles']} | {record['verdict']} | {record['nodes']} "
-                  f"| {record['modes']} | {record['cpu_seconds']:.1f} | {record['wall_seconds']:.1f} "
-                  f"| {record['peak_gib']:.2f} |", flush=True)
+            bench.print_row(path.name, *(record[key] for key in ("triangles", "verdict", "nodes", "modes")),
+                            f"{record['cpu_seconds']:.1f}", f"{record['wall_seconds']:.1f}",
+                            f"{record['peak_gib']:.2f}")
     summarize(records)

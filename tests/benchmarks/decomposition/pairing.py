@@ -13,21 +13,6 @@ DEGENERATE = 2e-3
 ALIKE = 0.8
 
 
-def read_arrays(path):
-    """The arrays of a model's file by name (docs/model_format.md)."""
-    import scripted
-    from carillon.v1 import modal_model_pb2
-
-    first, *chunks = scripted.read_records(path)
-    header, parts = first.header, {}
-    for record in chunks:
-        parts.setdefault(record.chunk.array, []).append(record.chunk.data)
-    types = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEMENT_TYPE_FLOAT64: "<f8",
-             modal_model_pb2.ELEMENT_TYPE_UINT32: "<u4"}
-    return {array.name: numpy.frombuffer(b"".join(parts.get(number, [])), types[array.type]).reshape(array.shape)
-            for number, array in enumerate(header.arrays)}
-
-
 def sampled(arrays, vertices):
     """The shapes at these vertices, of norm one: (3 times the vertices) by the modes."""
     shapes = arrays["shapes"][vertices].astype(float)

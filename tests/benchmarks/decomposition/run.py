@@ -15,62 +15,45 @@ Nothing is kept from one run to the next, but for what `packages` adds to the fi
 large bodies run with --full only, or where --peers names them. CPU seconds are those of one thread for everybody.
 """
 
-import argparse
 import os
 import pathlib
 import sys
 import tempfile
 
-import calculix
-import compare
-import estimates
-import growth
-import packages
-import users
-
-
-def processor_flags():
-    with open("/proc/cpuinfo", encoding="ascii") as file:
-        for line in file:
-            if line.startswith("flags"):
-                return set(line.split())
-    return set()
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
+import calculix  # noqa: E402
+import compare  # noqa: E402
+import estimates  # noqa: E402
+import growth  # noqa: E402
+import packages  # noqa: E402
+import users  # noqa: E402
 
 
 def fair_environment():
     """One thread, and OpenBLAS' kernels for this processor: Debian's takes its oldest ones on a processor it does
     not know by number. Carillon mends that for itself; here everybody gets the same."""
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    flags = processor_flags()
-    if "OPENBLAS_CORETYPE" not in environment:
-        if {"avx512vl", "avx512bw"} <= flags:
-            environment["OPENBLAS_CORETYPE"] = "SkylakeX"
-        elif {"avx2", "fma"} <= flags:
-            environment["OPENBLAS_CORETYPE"] = "Haswell"
+    flags = set(pathlib.Path("/proc/cpuinfo").read_text().partition("flags")[2].partition("\n")[0].split())
+    if {"avx512vl", "avx512bw"} <= flags:
+        environment.setdefault("OPENBLAS_CORETYPE", "SkylakeX")
+    elif {"avx2", "fma"} <= flags:
+        environment.setdefault("OPENBLAS_CORETYPE", "Haswell")
     return environment
 
 
-PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies,
-         "growth": growth.growth,
+PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies, "growth": growth.growth,
          "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}
-
-
 HOURS = ("estimates", "bodies", "packages")  # take from half an hour to two hours
 
 
-def names(text):
-    return text.split(",")
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
+    parser = bench.parser(__doc__)
     parser.add_argument("--full", action="store_true", help="slow programs and large bodies, too")
-    parser.add_argument("--parts", type=names, default=[part for part in PARTS if part not in HOURS],
+    parser.add_argument("--parts", type=bench.names, default=[part for part in PARTS if part not in HOURS],
                         help=f"some of {','.join(PARTS)}; all but {','.join(HOURS)} unless named")
-    parser.add_argument("--only", type=names, default=[], help="bodies, by name")
-    parser.add_argument("--peers", type=names, default=[], help="other programs, by name")
+    parser.add_argument("--only", type=bench.names, default=[], help="bodies, by name")
+    parser.add_argument("--peers", type=bench.names, default=[], help="other programs, by name")
     parser.add_argument("--results", type=pathlib.Path,
                         help="where `packages` keeps each outcome, to go on from there (one JSON object a line)")
     options = parser.parse_args()

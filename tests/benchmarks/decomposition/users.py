@@ -6,6 +6,7 @@ import math
 import pathlib
 from typing import Callable
 
+import bench
 import bodies
 import measured
 import numpy
@@ -143,19 +144,19 @@ def true_errors(body, surface, run, options, environment):
 def row(body, surface, options, environment):
     run = measured.precompute(surface, [*body.arguments, "--material", body.material], options, environment,
                               MOST_SECONDS)
-    cost = f"{run.cpu_seconds:.1f} | {run.wall_seconds:.1f} | {run.peak_gib:.2f}"
+    cells = [body.name, run.verdict, f"{run.cpu_seconds:.1f}", f"{run.wall_seconds:.1f}", f"{run.peak_gib:.2f}"]
     if run.verdict != "model":
-        return f"| {body.name} | {run.verdict} | {cost} | | | | |"
+        return [*cells, *[""] * 4]
     modes = run.report["modes"]
     stated = 100 * max(mode["estimated_error"] for mode in modes)
     true = true_errors(body, surface, run, options, environment)
     truth = "not computed" if true is None else f"{true[0]:.2f} % ({true[1]:.1f} times the nodes)"
-    return f"| {body.name} | model | {cost} | {run.report['nodes']} | {len(modes)} | {stated:.2f} % | {truth} |"
+    return [*cells, run.report["nodes"], len(modes), f"{stated:.2f} %", truth]
 
 
 def users(options, folder, environment):
-    print("| body | verdict | CPU s | wall s | peak GiB | nodes | modes | largest stated error | largest true error |\n"
-          + "| --- " * 9 + "|", flush=True)
+    bench.print_head("body", "verdict", "CPU s", "wall s", "peak GiB", "nodes", "modes", "largest stated error",
+                     "largest true error")
     for number, body in enumerate(BODIES):
         if options.only and body.name not in options.only:
             continue
@@ -163,4 +164,4 @@ def users(options, folder, environment):
         if not isinstance(surface, pathlib.Path):
             surface = folder / f"{number}.obj"
             bodies.write_obj(surface, *body.source())
-        print(row(body, surface, options, environment), flush=True)
+        bench.print_row(*row(body, surface, options, environment))

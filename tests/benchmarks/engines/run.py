@@ -7,18 +7,17 @@ energy of the first blow, of a roll and of a slide the mean power. Beside it sta
 sample at rest relative to the greatest of all, and how far lines at the step rate stand out of a roll or a slide.
 """
 
-import argparse
 import json
-import os
 import pathlib
 import statistics
 import subprocess
 import sys
-import tempfile
 
 import numpy
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
+
 RATES_HZ = (60, 240, 1000)
 SAMPLE_RATE_HZ = 48000
 # Scene: simulated seconds, and the window of what travels.
@@ -135,50 +134,39 @@ def print_table(name, table):
     print(f"\n{name}: dB of the median; bold is beyond {LIMITS_DB[name]} dB, rests above {REST_DB} dB, or has lines\n")
     engines = dict.fromkeys(engine for engine, _ in table)
     rates = dict.fromkeys(rate for _, rate in table)
-    print("| engine | " + " | ".join(f"{rate} Hz" for rate in rates) + " |")
-    print("| --- " * (1 + len(rates)) + "|")
+    bench.print_head("engine", *(f"{rate} Hz" for rate in rates))
     for engine in engines:
-        print(f"| {engine} | " + " | ".join(cell(name, table[engine, rate]) for rate in rates) + " |", flush=True)
+        bench.print_row(engine, *(cell(name, table[engine, rate]) for rate in rates))
     return sum(not is_right(name, measured) for measured in table.values())
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser = bench.parser(__doc__)
     parser.add_argument("--scenes", nargs="*", default=list(SECONDS), choices=list(SECONDS))
     parser.add_argument("--engines", nargs="*", help="all unless named")
     parser.add_argument("--rates", nargs="*", type=int, default=RATES_HZ)
     parser.add_argument("--keep", type=pathlib.Path, help="a folder that keeps traces and sounds")
     options = parser.parse_args()
-    build = options.build.resolve()
-    sys.path[:0] = map(str, (build / "client_sdk/python", ROOT / "client_sdk/python", ROOT / "tests/integration",
-                             ROOT / "client_sdk/examples/falls", ROOT / "tests/client_sdk/adapters"))
-    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
-    # They need the paths above.
+    bench.use(options.build, "client_sdk/examples/falls", "tests/client_sdk/adapters")
+    # They need the paths of `use`.
     import carillon
     import falls
-    from daemon import Daemon
     wrong = 0
-    with tempfile.TemporaryDirectory(prefix="carillon-") as name:
-        folder = options.keep or pathlib.Path(name)
+    with bench.daemon() as daemon, carillon.connect(daemon.server) as client:
+        folder = options.keep or daemon.folder
         folder.mkdir(parents=True, exist_ok=True)
-        daemon = Daemon(pathlib.Path(name))
-        try:
-            with carillon.connect(daemon.server) as client:
-                for scene_name in options.scenes:
-                    scene = falls.create_models(client, scene_of(scene_name))
-                    table = {}
-                    for engine in options.engines or engines_of(scene_name):
-                        for rate in options.rates:
-                            trace = folder / f"{scene_name}-{engine}-{rate}.contacts"
-                            record(scene_name, engine, scene, trace, rate, build)
-                            sound = render(client, trace)
-                            if options.keep:
-                                sound.save(trace.with_suffix(".wav"))
-                            table[engine, rate] = measure(scene_name, sound.mono, rate)
-                    wrong += print_table(scene_name, table)
-        finally:
-            daemon.stop()
+        for scene_name in options.scenes:
+            scene = falls.create_models(client, scene_of(scene_name))
+            table = {}
+            for engine in options.engines or engines_of(scene_name):
+                for rate in options.rates:
+                    trace = folder / f"{scene_name}-{engine}-{rate}.contacts"
+                    record(scene_name, engine, scene, trace, rate, options.build)
+                    sound = render(client, trace)
+                    if options.keep:
+                        sound.save(trace.with_suffix(".wav"))
+                    table[engine, rate] = measure(scene_name, sound.mono, rate)
+            wrong += print_table(scene_name, table)
     print(f"\n{wrong} numbers are beyond the limits")
     return 1 if wrong else 0
 

@@ -10,22 +10,21 @@ Prints Markdown tables. A sound is the closed form of a struck body whose freque
 stands for what a mesh misses, decomposed at another Poisson's ratio than that of the model.
 """
 
-import argparse
 import dataclasses
 import json
 import math
 import os
 import pathlib
-import subprocess
 import sys
-import tempfile
 import time
 
 import numpy
 
-import bodies
-
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent), str(HERE.parent / "decomposition")]
+import bench  # noqa: E402
+import struck  # noqa: E402
+
 HARD_S, SOFT_S = (40e-6, 120e-6), (2e-4, 6e-4)
 ROWS = {f"{name}{noise}{'room' * room}": (span, noise, room)
         for name, span in (("hard", HARD_S), ("soft", SOFT_S))
@@ -61,34 +60,38 @@ class Outcome:
 
 
 class Studio:
-    """A daemon with the models of the bodies, and files in a folder."""
+    """A daemon with the models of the bodies, and files in its folder."""
 
-    def __init__(self, build, folder):
-        self.bin, self.folder = build / "bin", folder
-        import daemon
+    def __init__(self, build, daemon):
+        self.build, self.daemon, self.folder = build, daemon, daemon.folder
 
-        self.daemon = daemon.Daemon(folder)
-
-    def decompose(self, body, material, nu):
+    def decompose(self, name, surface, young, density, nu, *options):
+        """The file with the model of a surface."""
         import meshes
 
-        young, density, _ = bodies.MATERIALS[material]
-        mesh, out = self.folder / f"{body}.obj", self.folder / f"{body}-{material}-{nu:.4f}.model"
+        mesh, out = self.folder / f"{name}.obj", self.folder / f"{name}.model"
         if not out.exists():
-            mesh.write_bytes(meshes.obj(*bodies.BODIES[body][0]))
-            subprocess.run([self.bin / "carillon-precompute", mesh, "--out", out, "--young", str(young), "--density",
-                            str(density), "--poisson", str(nu), "--band", "20:20000"], check=True, capture_output=True)
+            mesh.write_bytes(meshes.obj(*surface))
+            bench.decompose(self.build, mesh, out, "--young", young, "--density", density, "--poisson", nu, *options)
         return out
 
+    def known(self, body, material, nu):
+        """The file with the model of a body of known material."""
+        young, density, _ = struck.MATERIALS[material]
+        return self.decompose(f"{body}-{material}-{nu:.4f}", struck.BODIES[body][0], young, density, nu, "--band",
+                              "20:20000")
+
     def truth(self, body, material, nu):
-        header, arrays = bodies.read_arrays(self.decompose(body, material, nu))
-        return bodies.Truth(body, material, nu, arrays["eigenvalues"], arrays["couplings"],
+        header, arrays = bench.read_model(self.known(body, material, nu))
+        return struck.Truth(body, material, nu, arrays["eigenvalues"], arrays["couplings"],
                             arrays["shapes"].astype(float), numpy.array(header.estimated_errors))
 
-    def model(self, body, material):
-        """The name of the stored model of a body."""
-        path = self.decompose(body, material, bodies.NU_OF_MODELS)
+    def store(self, path):
+        """The name of a model that the daemon stores."""
         return json.loads(self.daemon.command("--json", "model", "import", path).stdout)["name"]
+
+    def model(self, body, material):
+        return self.store(self.known(body, material, struck.NU_OF_MODELS))
 
     def fit(self, model, *arguments):
         """The JSON of a fit, or None and the refusal."""
@@ -105,9 +108,9 @@ class Studio:
         hz = truth.frequencies_hz() * (1 + JITTER * random.standard_normal(len(truth.eigenvalues)))
         files = []
         for strike in range(STRIKES):
-            sound = bodies.strike(truth, hz, random.uniform(*span), noise_db, room, random, keep)
+            sound = struck.strike(truth, hz, random.uniform(*span), noise_db, room, random, keep)
             files.append(self.folder / f"{name}-{strike}.wav")
-            bodies.write_wave(files[-1], sound)
+            struck.write_wave(files[-1], sound)
         return files
 
 
@@ -148,7 +151,7 @@ def deviations(truth, answer, name):
 def cases():
     """Yields (number, body, material, Poisson's ratio)."""
     number = 0
-    for body, (_, materials) in bodies.BODIES.items():
+    for body, (_, materials) in struck.BODIES.items():
         for material in materials:
             number += 1
             yield number, body, material, round(float(numpy.random.default_rng(99 + number).uniform(0.18, 0.38)), 3)
@@ -190,9 +193,9 @@ def run_wrong(studio):
         truth = studio.truth(body, material, nu)
         random = numpy.random.default_rng(7000 + number)
         files = studio.strikes("wrong", truth, HARD_S, 40, None, random)
-        others = [other for other in bodies.BODIES if other != body]
+        others = [other for other in struck.BODIES if other != body]
         for other in (others[number % 4], others[(number + 1) % 4]):
-            model = studio.model(other, bodies.BODIES[other][1][0])
+            model = studio.model(other, struck.BODIES[other][1][0])
             outcomes.append(judge(truth, *studio.fit(model, *files, "--density", truth.density)))
     return outcomes
 
@@ -209,20 +212,21 @@ def print_row(name, outcomes, damping=True):
         values = list(values)
         return float(numpy.median(values)) if values else math.nan
 
-    print(f"| {name} | {len(outcomes)} | {len(outcomes) - len(answers)} | "
-          f"{count(many, lambda o: abs(o.young_error) < 0.005)} | {count(many, lambda o: abs(o.nu_error) < 0.02)} | "
-          + (f"{count(lawful, lambda o: o.damping_error < 0.1)}, {len(answers) - len(lawful)} without | " if damping
-             else "- | ") +
-          f"{count(answers, lambda o: abs(o.young_error) < 0.01)} | "
-          f"{100 * median(abs(o.young_error) for o in answers):.2f} %, {median(abs(o.nu_error) for o in answers):.4f}, "
-          + (f"{100 * median(o.damping_error for o in lawful):.1f} %" if damping else "-") +
-          f", {median(o.matched for o in answers):.0f} | {median(o.cpu_s for o in outcomes):.1f} |", flush=True)
+    laws, off = "-", "-"
+    if damping:
+        laws = f"{count(lawful, lambda o: o.damping_error < 0.1)}, {len(answers) - len(lawful)} without"
+        off = f"{100 * median(o.damping_error for o in lawful):.1f} %"
+    bench.print_row(
+        name, len(outcomes), len(outcomes) - len(answers), count(many, lambda o: abs(o.young_error) < 0.005),
+        count(many, lambda o: abs(o.nu_error) < 0.02), laws, count(answers, lambda o: abs(o.young_error) < 0.01),
+        f"{100 * median(abs(o.young_error) for o in answers):.2f} %, {median(abs(o.nu_error) for o in answers):.4f}, "
+        f"{off}, {median(o.matched for o in answers):.0f}", f"{median(o.cpu_s for o in outcomes):.1f}")
 
 
 def print_bars(rows):
     """How many truths lie within two stated standard errors."""
-    print("\n| strikes | E/rho | nu | decays | rates by the law | of them in laws over 10 % off |")
-    print("| --- | --- | --- | --- | --- | --- |")
+    print()
+    bench.print_head("strikes", "E/rho", "nu", "decays", "rates by the law", "of them in laws over 10 % off")
 
     def count(outcomes, bar):
         ratios = numpy.concatenate([outcome.bars[bar] for outcome in outcomes] or [[]])
@@ -230,13 +234,12 @@ def print_bars(rows):
 
     for name, outcomes in (*rows.items(), ("all", sum(rows.values(), []))):
         off = [outcome for outcome in outcomes if (outcome.damping_error or 0) > 0.1]
-        print(f"| {name} | {' | '.join(count(outcomes, bar) for bar in range(4))} | {count(off, 3)} |", flush=True)
+        bench.print_row(name, *(count(outcomes, bar) for bar in range(4)), count(off, 3))
 
 
 def show_table(studio, rows, draws):
-    print("| strikes | cases | refused | E/rho < 0.5 % (six lines) | nu < 0.02 (six lines) | damping < 10 % "
-          "| E/rho < 1 % | median E/rho, nu, damping, lines | CPU s |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    bench.print_head("strikes", "cases", "refused", "E/rho < 0.5 % (six lines)", "nu < 0.02 (six lines)",
+                     "damping < 10 %", "E/rho < 1 %", "median E/rho, nu, damping, lines", "CPU s")
     outcomes = {}
     for row in rows:
         outcomes[row] = [outcome for draw in draws for outcome in run_row(studio, row, draw)]
@@ -253,18 +256,13 @@ def show_wrong(studio):
 
 
 def show_bar(studio, recordings):
-    import meshes
-
     recording = recordings / "steel_bar_114x25.4x3.12mm.wav"
     if not recording.exists():
         print("\nThe recording of the bar is missing.")
         return
-    mesh, model = studio.folder / "steel_bar.obj", studio.folder / "steel_bar.model"
-    mesh.write_bytes(meshes.obj(*bodies.box(*BAR_SIZE_M)))
-    subprocess.run([studio.bin / "carillon-precompute", mesh, "--out", model, "--young", "210e9", "--density", "7855",
-                    "--poisson", "0.28", "--band", "20:22000", "--accuracy", "0.5%"], check=True, capture_output=True)
-    name = json.loads(studio.daemon.command("--json", "model", "import", model).stdout)["name"]
-    answer, refusal, cpu_s = studio.fit(name, recording, "--mass", BAR_MASS_KG)
+    model = studio.decompose("steel_bar", struck.box(*BAR_SIZE_M), 210e9, 7855, 0.28, "--band", "20:22000",
+                             "--accuracy", "0.5%")
+    answer, refusal, cpu_s = studio.fit(studio.store(model), recording, "--mass", BAR_MASS_KG)
     if answer is None:
         print(f"\nThe steel bar: {refusal}")
         return
@@ -276,14 +274,9 @@ def show_bar(studio, recordings):
 
 def show_block(studio):
     """Ogi's block, of which frequencies alone are known."""
-    import meshes
-
-    mesh, model, table = (studio.folder / f"block.{suffix}" for suffix in ("obj", "model", "csv"))
-    mesh.write_bytes(meshes.obj(*bodies.box(*OGI_SIZE_M)))
-    subprocess.run([studio.bin / "carillon-precompute", mesh, "--out", model, "--young", "70e9", "--density",
-                    str(OGI_DENSITY), "--poisson", "0.33", "--band", "20:350000", "--accuracy", "0.1%"], check=True,
-                   capture_output=True)
-    name = json.loads(studio.daemon.command("--json", "model", "import", model).stdout)["name"]
+    name = studio.store(studio.decompose("block", struck.box(*OGI_SIZE_M), 70e9, OGI_DENSITY, 0.33, "--band",
+                                         "20:350000", "--accuracy", "0.1%"))
+    table = studio.folder / "block.csv"
     lame = OGI_C11_PA - 2 * OGI_C44_PA
     young, nu = OGI_C44_PA * (3 * lame + 2 * OGI_C44_PA) / (lame + OGI_C44_PA), lame / (2 * (lame + OGI_C44_PA))
     for count, known in ((len(OGI_KHZ), ()), (12, ()), (12, ("--young-range", "69e9:75e9"))):
@@ -296,31 +289,24 @@ def show_block(studio):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True)
+    parser = bench.parser(__doc__)
     parser.add_argument("--recordings", type=pathlib.Path, default=HERE.parents[3] / "shared/recordings")
     parser.add_argument("--rows", default=",".join(ROWS))
     parser.add_argument("--draws", default="0", help="numbers, each of which draws other strikes and rooms")
     parser.add_argument("--parts", default="table,wrong,bar,block")
     options = parser.parse_args()
-    build = options.build.resolve()
-    os.environ["CARILLON_BIN_DIR"] = str(build / "bin")
-    root = HERE.parents[2]
-    sys.path[:0] = [str(build / "client_sdk/python"), str(root / "tests/integration"), str(root / "client_sdk/python")]
+    bench.use(options.build)
     started = time.monotonic()
-    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-        studio = Studio(build, pathlib.Path(folder))
-        try:
-            if "table" in options.parts:
-                show_table(studio, options.rows.split(","), [int(draw) for draw in options.draws.split(",")])
-            if "wrong" in options.parts:
-                show_wrong(studio)
-            if "bar" in options.parts:
-                show_bar(studio, options.recordings)
-            if "block" in options.parts:
-                show_block(studio)
-        finally:
-            studio.daemon.stop()
+    with bench.daemon() as daemon:
+        studio = Studio(options.build, daemon)
+        if "table" in options.parts:
+            show_table(studio, options.rows.split(","), [int(draw) for draw in options.draws.split(",")])
+        if "wrong" in options.parts:
+            show_wrong(studio)
+        if "bar" in options.parts:
+            show_bar(studio, options.recordings)
+        if "block" in options.parts:
+            show_block(studio)
     print(f"\n{time.monotonic() - started:.0f} s.")
 
 

@@ -6,24 +6,19 @@ In each step every body of every environment has a pose, and one of them is stru
 the daemon and that of the client.
 """
 
-import argparse
 import json
 import os
 import pathlib
 import subprocess
 import sys
-import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
+
 CASES = ((1, 5, 60, 0.02), (64, 5, 60, 0.02), (1024, 1, 20, 0.002))  # environments, bodies, modes of each, step, s
 COLUMNS = ("client", "environments", "bodies", "modes", "step, ms", "times real time", "a step, us",
            "an environment's step, us of CPU", "of that the client's")
-
-
-def cpu_s(pid):
-    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Python:
@@ -65,44 +60,33 @@ class Cpp:
 
 def measure(daemon, language, client, model, case, seconds):
     before = []
-    found = client.run(model, case, seconds, lambda: before.append(cpu_s(daemon.process.pid)))
-    daemon_s = cpu_s(daemon.process.pid) - before[0]
+    found = client.run(model, case, seconds, lambda: before.append(bench.cpu_s(daemon.process.pid)))
+    daemon_s = bench.cpu_s(daemon.process.pid) - before[0]
     assert found["loudest"] > 0, "nothing was heard"
     environments, bodies, modes, step = case
     each = 1e6 / found["steps"] / environments  # from seconds in all to us of each environment and step
-    cells = (language, environments, bodies, modes, 1000 * step, f"{found['steps'] * step / found['seconds']:.2f}",
-             f"{1e6 * found['seconds'] / found['steps']:.0f}", f"{(daemon_s + found['cpu_s']) * each:.1f}",
-             f"{found['cpu_s'] * each:.1f}")
-    print(f"| {' | '.join(map(str, cells))} |", flush=True)
+    bench.print_row(language, environments, bodies, modes, 1000 * step,
+                    f"{found['steps'] * step / found['seconds']:.2f}", f"{1e6 * found['seconds'] / found['steps']:.0f}",
+                    f"{(daemon_s + found['cpu_s']) * each:.1f}", f"{found['cpu_s'] * each:.1f}")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/release")
+    parser = bench.parser(__doc__)
     parser.add_argument("--seconds", type=float, default=5, help="of each case")
     parser.add_argument("--cases", type=int, nargs="+", default=range(len(CASES)))
     options = parser.parse_args()
-    build = options.build.resolve()
-    sys.path[:0] = [str(build / "client_sdk/python"), str(ROOT / "client_sdk/python"),
-                    str(ROOT / "tests/integration"), str(ROOT / "tests/integration/clients")]
-    os.environ.update(CARILLON_BIN_DIR=str(build / "bin"), CARILLON_BUILD_DIR=str(build))
-    # They need the paths above.
+    bench.use(options.build, "tests/integration/clients")
+    # They need the paths of `use`.
     import carillon
     import meshes
-    from daemon import Daemon
-    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-        daemon = Daemon(folder)
-        try:
-            with carillon.connect(daemon.server) as connection:
-                clients = {"Python": Python(connection), "C++": Cpp(build / "tests/performed", daemon.server)}
-                print(f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}")
-                for case in (CASES[i] for i in options.cases):
-                    model = connection.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL,
-                                                    settings={"keep_mode_count": case[2]}, without_transfer=True)
-                    for language, client in clients.items():
-                        measure(daemon, language, client, model, case, options.seconds)
-        finally:
-            daemon.stop()
+    with bench.daemon() as daemon, carillon.connect(daemon.server) as connection:
+        clients = {"Python": Python(connection), "C++": Cpp(options.build / "tests/performed", daemon.server)}
+        bench.print_head(*COLUMNS)
+        for case in (CASES[i] for i in options.cases):
+            model = connection.create_model(meshes.box(meshes.BAR_SIZE), meshes.MATERIAL,
+                                            settings={"keep_mode_count": case[2]}, without_transfer=True)
+            for language, client in clients.items():
+                measure(daemon, language, client, model, case, options.seconds)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ their range. All render the same modes: frequencies log-uniform from 20 Hz to 20
 60 s; none ever sleeps.
 """
 
-import argparse
 import json
 import os
 import pathlib
@@ -20,8 +19,8 @@ import tempfile
 
 import supercollider_peer
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-PARTS = ("ringing", "directed", "flood", "latency")
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
 
 
 def carillon(build, *arguments, most_target=None):
@@ -35,10 +34,6 @@ def population(build, count):
     text = subprocess.run([build / "tests/mixer_measure", "population", str(count), "1"], check=True,
                           capture_output=True, text=True).stdout
     return [tuple(map(float, line.split())) for line in text.splitlines()]
-
-
-def row(*cells):
-    print("| " + " | ".join(str(cell) for cell in cells) + " |", flush=True)
 
 
 def has(target, build):
@@ -61,55 +56,48 @@ def turns(options, folder, modes):
 
 
 def ringing(options, folder):
-    print("\n## Modes a core\n\n| what | modes | load | modes a core | times Klank | from ... to |\n"
-          "| --- | --- | --- | --- | --- | --- |")
+    print("\n## Modes a core\n")
+    bench.print_head("what", "modes", "load", "modes a core", "times Klank", "from ... to")
     modes = population(options.build, 800)
-    row("scsynth Klank, 800 modes", "", "", f"{supercollider_peer.throughput(folder, modes):,.0f}", "1.00", "")
+    klank = supercollider_peer.throughput(folder, modes)
+    bench.print_row("scsynth Klank, 800 modes", "", "", f"{klank:,.0f}", "1.00", "")
     for (target, what, count), results in turns(options, folder, modes).items():
         loads, rates, times = zip(*results)
         what = {"ringing": "ringing freely", "struck": "every bank struck in every block"}[what]
-        row(f"Carillon {target}, {what}", f"{count:,.0f}", f"{statistics.median(loads):.1%}",
-            f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}",
-            f"{min(times):.1f} ... {max(times):.1f}")
+        bench.print_row(f"Carillon {target}, {what}", f"{count:,.0f}", f"{statistics.median(loads):.1%}",
+                        f"{statistics.median(rates):,.0f}", f"{statistics.median(times):.1f}",
+                        f"{min(times):.1f} ... {max(times):.1f}")
 
 
 def directed(options, _folder):
-    print("\n## Objects with a place, and with directions\n\n| what | objects x modes | harmonics | load of one core | "
-          "slowest hundredth of the blocks, ms |\n| --- | --- | --- | --- | --- |")
+    print("\n## Objects with a place, and with directions\n")
+    bench.print_head("what", "objects x modes", "harmonics", "load of one core", "slowest hundredth of the blocks, ms")
     for result in carillon(options.build, "directed", options.seconds):
-        row(result["what"], f"{result['objects']} x {result['modes']}", f"{result['harmonics']:,}",
-            f"{result['load']:.2%}", f"{result['p99_block_ms']:.3f}")
+        bench.print_row(result["what"], f"{result['objects']} x {result['modes']}", f"{result['harmonics']:,}",
+                        f"{result['load']:.2%}", f"{result['p99_block_ms']:.3f}")
 
 
 def flood(options, _folder):
-    print("\n## Flood: 20 ringing bodies of 10,000 vertices and 800 modes, random triangles, four streams\n\n"
-          "| impulses/s | taken/s | merged/s | shed/s | lost | load | median, worst block ms | over 2.67 ms | "
-          "missed behind 8 blocks |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("\n## Flood: 20 ringing bodies of 10,000 vertices and 800 modes, random triangles, four streams\n")
+    bench.print_head("impulses/s", "taken/s", "merged/s", "shed/s", "lost", "load", "median, worst block ms",
+                     "over 2.67 ms", "missed behind 8 blocks")
     for result in carillon(options.build, "flood", options.flood_seconds):
         if result["what"] == "merging":
             merging = result["error_db"]
             continue
-        row(f"{result['rate']:,.0f}", f"{result['taken_per_s']:,.0f}", f"{result['merged_per_s']:,.0f}",
-            f"{result['shed_per_s']:,.0f}", result["dropped"], f"{result['load']:.1%}",
-            f"{result['median_block_ms']:.2f}, {result['worst_block_ms']:.2f}", result["late_blocks"],
-            result["missed"])
+        bench.print_row(f"{result['rate']:,.0f}", f"{result['taken_per_s']:,.0f}", f"{result['merged_per_s']:,.0f}",
+                        f"{result['shed_per_s']:,.0f}", result["dropped"], f"{result['load']:.1%}",
+                        f"{result['median_block_ms']:.2f}, {result['worst_block_ms']:.2f}", result["late_blocks"],
+                        result["missed"])
     print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
 
 
-def use_integration_tests(options):
-    """Their modules need the generated messages, which come with the build."""
-    os.environ["CARILLON_BIN_DIR"] = str(options.build / "bin")
-    sys.path += [str(ROOT / "tests/integration"), str(ROOT / "client_sdk/python"),
-                 str(options.build / "client_sdk/python")]
-
-
 def latency(options, folder):
-    use_integration_tests(options)
+    bench.use(options.build)
     import jack
-    print("\n## From a strike at the client to its first sample in a JACK capture, ms\n\n"
-          "| time stamp, blocks ahead | strikes | delay + look-ahead, as stated | p50 | p99 | p99.9 | least, most | "
-          "came too late | in place to the sample | JACK cycles missed, xruns |\n"
-          "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("\n## From a strike at the client to its first sample in a JACK capture, ms\n")
+    bench.print_head("time stamp, blocks ahead", "strikes", "delay + look-ahead, as stated", "p50", "p99", "p99.9",
+                     "least, most", "came too late", "in place to the sample", "JACK cycles missed, xruns")
     names = {"stream": "now", "ahead": "50 ms before", "arrival": "now, no delay"}
     for blocks in (8, 2):
         scratch = folder / str(blocks)
@@ -118,20 +106,21 @@ def latency(options, folder):
         try:
             for way in jack.LatencyMeasurement.WAYS:
                 found = measurement.measure(way, *options.latency_strikes)
-                row(f"{names[way]}, {blocks}", found["strikes"],
-                    f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}", f"{found['p50_ms']:.2f}",
-                    f"{found['p99_ms']:.2f}", f"{found['p999_ms']:.2f}",
-                    f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
-                    f"{found['missed_cycles']}, {found['xruns']}")
+                bench.print_row(f"{names[way]}, {blocks}", found["strikes"],
+                                f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}",
+                                *(f"{found[name]:.2f}" for name in ("p50_ms", "p99_ms", "p999_ms")),
+                                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
+                                f"{found['missed_cycles']}, {found['xruns']}")
         finally:
             measurement.stop()
 
 
+PARTS = {"ringing": ringing, "directed": directed, "flood": flood, "latency": latency}
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
-    parser.add_argument("--parts", type=lambda text: text.split(","), default=list(PARTS),
-                        help="some of " + ",".join(PARTS))
+    parser = bench.parser(__doc__)
+    parser.add_argument("--parts", type=bench.names, default=list(PARTS), help="some of " + ",".join(PARTS))
     parser.add_argument("--seconds", type=float, default=5,
                         help="of sound, for each measurement of 80,000 modes or more; of fewer it is longer")
     parser.add_argument("--turns", type=int, default=5, help="of measurements of modes")
@@ -142,8 +131,7 @@ def main():
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
         with tempfile.TemporaryDirectory() as folder:
-            run = {"ringing": ringing, "directed": directed, "flood": flood, "latency": latency}
-            run[part](options, pathlib.Path(folder))
+            PARTS[part](options, pathlib.Path(folder))
     print(f"\nload average after: {os.getloadavg()[0]:.1f}")
     return 0
 

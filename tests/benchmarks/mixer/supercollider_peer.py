@@ -9,7 +9,6 @@ import struct
 import subprocess
 
 AUDIO_RATE = 2
-SCALAR_RATE = 0
 
 
 def cpu_seconds(command, **options):

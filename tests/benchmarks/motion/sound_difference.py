@@ -2,9 +2,6 @@
 """How the sound of contacts that `carillon.motion` finds in the poses of frames differs from the sound of the engine's
 own contacts: levels of octaves, peak, and the envelope of 5 ms."""
 
-import pathlib
-import tempfile
-
 import numpy
 
 SAMPLE_RATE_HZ, ENGINE_HZ = 48000, 2400
@@ -79,27 +76,20 @@ def row(truth, found, samples):
             f"{100 * found.unexplained:.2f} %", f"{100 * found.ambiguous:.0f} %"]
 
 
-def rows(build):
+def rows(daemon, build):
     """Yields a row for each scene and rate of frames."""
     import carillon
     import falls
-    from daemon import Daemon
-    with tempfile.TemporaryDirectory(prefix="carillon-") as name:
-        folder = pathlib.Path(name)
-        daemon = Daemon(folder)
-        try:
-            with carillon.connect(daemon.server) as client:
-                for label, scene in scenes().items():
-                    path = folder / f"{label}.contacts"
-                    falls.record("bullet", falls.create_models(client, scene), path, rate=ENGINE_HZ, build=build)
-                    trace = carillon.Trace.read(path)
-                    truth = render(client, trace)
-                    for rate in FRAME_RATES:
-                        try:
-                            found = find(daemon.server, scene, trace.steps[::ENGINE_HZ // rate])
-                        except carillon.CarillonError as error:
-                            yield [label, str(rate), error.reason]
-                            continue
-                        yield [label, str(rate), *row(truth, found, render(client, found.trace))]
-        finally:
-            daemon.stop()
+    with carillon.connect(daemon.server) as client:
+        for label, scene in scenes().items():
+            path = daemon.folder / f"{label}.contacts"
+            falls.record("bullet", falls.create_models(client, scene), path, rate=ENGINE_HZ, build=build)
+            trace = carillon.Trace.read(path)
+            truth = render(client, trace)
+            for rate in FRAME_RATES:
+                try:
+                    found = find(daemon.server, scene, trace.steps[::ENGINE_HZ // rate])
+                except carillon.CarillonError as error:
+                    yield label, rate, error.reason
+                    continue
+                yield label, rate, *row(truth, found, render(client, found.trace))

@@ -2,8 +2,8 @@
 """The paper's figure 4: the bunny cut open, and its responses to an impulse on its nose and on its back."""
 
 import pathlib
-import tempfile
 
+import bench
 import figures
 import mode_shapes
 import numpy
@@ -25,7 +25,7 @@ def struck_points(vertices):
 def responses(folder, row, points):
     """{name: (Hz, amplitude)} as the paper renders it; both have one scale, and the greatest of all is 1."""
     spectra = {}
-    with tempfile.TemporaryDirectory(prefix="carillon-") as own, programs.Studio(own) as studio:
+    with programs.studio() as studio:
         heard = programs.Heard(studio.import_model(pathlib.Path(folder) / f"{row.name}.model"), row.material.figures())
         for name, (point, impulse) in points.items():
             blow = programs.Blow(tuple(map(float, point)), impulse, CONTACT_S)
@@ -73,7 +73,7 @@ def figure4(folder, row, path):
     vertices, triangles = row.fine()
     points = struck_points(vertices)
     spectra = responses(folder, row, points)
-    from matplotlib import pyplot
+    pyplot = bench.pyplot()
     figure = pyplot.figure(figsize=(9, 3.2), layout="constrained")
     grid = figure.add_gridspec(2, 3, width_ratios=(1, 1, 1.6))
     body = figure.add_subplot(grid[:, 0], projection="3d")

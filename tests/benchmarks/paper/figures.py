@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's figure 5, the spectra of blocks and boxes, from strikes that the daemon renders."""
 
-import os
 import pathlib
-import tempfile
 
+import bench
 import numpy
 import programs
 
@@ -35,10 +34,7 @@ def spectrum(sound, scaled=True):
 
 
 def draw(spectra, path):
-    os.environ.setdefault("MPLCONFIGDIR", tempfile.gettempdir())
-    import matplotlib
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    pyplot = bench.pyplot()
     figure, axes = pyplot.subplots(1, len(spectra), figsize=(9, 2.8), layout="constrained")
     for axis, (title, (hz, amplitude)) in zip(axes, spectra.items()):
         axis.fill_between(hz, amplitude, color="tab:blue")
@@ -55,7 +51,7 @@ def figure5(rows, folder, path):
     """Draws it; returns for each body the frequency of its highest peak and that below which half its energy lies,
     in Hz."""
     spectra, figures = {}, {}
-    with tempfile.TemporaryDirectory(prefix="carillon-") as own, programs.Studio(own) as studio:
+    with programs.studio() as studio:
         for name, side_m, title in (("blocks", .05, "block of 5 cm"), ("boxes", .5, "box of 50 cm")):
             spectra[title] = hz, amplitude = spectrum(strike(studio, pathlib.Path(folder), rows[name], side_m))
             energy = numpy.cumsum(amplitude**2)

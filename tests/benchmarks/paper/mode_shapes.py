@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's figure 3: mode shapes of the bowl, exaggerated."""
 
-import os
-import tempfile
-
+import bench
 import numpy
 import programs
 
@@ -13,7 +11,7 @@ EXAGGERATED = .14  # of the body's size
 def arrays_of(folder, name):
     """Arrays of a decomposed model as the Python client reads them."""
     import carillon
-    with tempfile.TemporaryDirectory(prefix="carillon-") as own, programs.Studio(own) as studio:
+    with programs.studio() as studio:
         model = studio.import_model(folder / f"{name}.model")
         with carillon.connect(studio.daemon.server) as client:
             return client.model(model).arrays
@@ -47,21 +45,6 @@ def draw_body(axis, vertices, triangles, view):
     axis.set_axis_off()
 
 
-def canvas(rows, columns):
-    os.environ.setdefault("MPLCONFIGDIR", tempfile.gettempdir())
-    import matplotlib
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-    return pyplot.subplots(rows, columns, figsize=(2.4 * columns, 2.2 * rows), layout="constrained", squeeze=False,
-                           subplot_kw={"projection": "3d"})
-
-
-def save(figure, path):
-    from matplotlib import pyplot
-    figure.savefig(path, dpi=66)
-    pyplot.close(figure)
-
-
 def distinct(eigenvalues, count):
     """Indices of the first modes that differ by more than 1 % in frequency from the one before."""
     frequencies = numpy.sqrt(eigenvalues)
@@ -74,10 +57,13 @@ def figure3(folder, row, solved, path):
     body = arrays_of(folder, row.name)
     vertices, triangles = body["vertices"], body["triangles"]
     modes = distinct(body["eigenvalues"], 3)
-    figure, axes = canvas(2, 4)
+    pyplot = bench.pyplot()
+    figure, axes = pyplot.subplots(2, 4, figsize=(9.6, 4.4), layout="constrained", squeeze=False,
+                                   subplot_kw={"projection": "3d"})
     for column, mode in enumerate([None, *modes]):
         shown = vertices if mode is None else moved(vertices, body["shapes"][:, :, mode])
         axes[0, column].set_title("at rest" if mode is None else f"{solved.modes[mode]['frequency_hz']:.0f} Hz")
         for axis, view in zip(axes[:, column], ((25, -60), (89, -90))):
             draw_body(axis, shown, triangles, view)
-    save(figure, path)
+    figure.savefig(path, dpi=66)
+    pyplot.close(figure)

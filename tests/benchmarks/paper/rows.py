@@ -2,12 +2,11 @@
 """The rows of the paper's Table 1, with shapes of our own where the paper gives none, and how they are computed."""
 
 import dataclasses
-import json
 import math
-import subprocess
 import sys
 from typing import Callable
 
+import bench
 import bodies
 import numpy
 import scene_makers
@@ -170,18 +169,14 @@ def table1():
 class Solver:
     """carillon-precompute, in a folder for its files."""
 
-    def __init__(self, program, folder):
-        self.program, self.folder = program, folder
+    def __init__(self, build, folder):
+        self.build, self.folder = build, folder
 
     def solve(self, surface, name, options):
         """Decomposes (vertices, triangles); leaves NAME.model in the folder."""
         path = self.folder / f"{name}.obj"
         bodies.write_obj(path, *surface)
-        run = subprocess.run([self.program, path, "--out", self.folder / f"{name}.model", "--json", *map(str, options)],
-                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
-        report = json.loads(run.stdout)
-        if run.returncode != 0:
-            sys.exit(f"{name}: {report['error']}")
+        report = bench.decompose(self.build, path, self.folder / f"{name}.model", *options)
         solved = Solved(report["nodes"], report["elements"], report["modes"],
                         sum(phase["cpu_seconds"] for phase in report["phases"]),
                         max(mode["residual"] for mode in report["modes"]))

@@ -9,7 +9,6 @@ BUILD/paper. Exits with 1, without the page, where an error in print is refuted,
 the measured one, or one that was tuned is off by 1 Hz. deploy/paper.sh installs what this needs.
 """
 
-import argparse
 import json
 import math
 import pathlib
@@ -17,24 +16,13 @@ import string
 import sys
 import tempfile
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[2]
 sys.dont_write_bytecode = True
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True)
-    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs")
-    return parser.parse_args()
-
-
-def take(build):
-    """Makes the modules of the other benchmarks and the contract in Python importable."""
-    sys.path[:0] = [str(ROOT / folder) for folder in
-                    ("tests/benchmarks/truth", "tests/benchmarks", "client_sdk/examples/falls")]
-    import programs
-    programs.use(build)
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent / folder) for folder in ("", "decomposition", "truth")]
+import bench  # noqa: E402
+import bodies  # noqa: E402
+import programs  # noqa: E402
+import table2  # noqa: E402
 
 
 def percent(value, reference):
@@ -49,34 +37,31 @@ def clock(seconds):
 
 
 def frequency_table(rows, linear, best):
-    from errata import head, line
-    yield from head("row", "the paper, Hz", "linear, Hz (nodes, elements)", "quadratic, Hz (nodes, elements)",
+    yield from bench.head("row", "the paper, Hz", "linear, Hz (nodes, elements)", "quadratic, Hz (nodes, elements)",
                     "estimated error", "size at which ours has the paper's frequency")
     for row in rows:
         low, high = linear[row.name], best[row.name]
         size = high.natural_hz / row.natural_hz
-        yield line(row.name, f"{row.printed.damped_hz} ({row.printed.nodes})",
+        yield bench.row(row.name, f"{row.printed.damped_hz} ({row.printed.nodes})",
                    f"{low.base['damped_frequency_hz']:.1f} ({low.nodes}, {low.elements})",
                    f"{high.base['damped_frequency_hz']:.1f} ({high.nodes}, {high.elements})",
                    f"{100 * high.base['estimated_error']:.2f} %", f"x {size:.3f}")
 
 
 def decay_table(rows, best):
-    from errata import head, line
-    yield from head("row", "printed, 1/s", "from the printed frequency, 1/s", "ours, 1/s", "our T60, s")
+    yield from bench.head("row", "printed, 1/s", "from the printed frequency, 1/s", "ours, 1/s", "our T60, s")
     for row in rows:
         decay = best[row.name].decay_per_s
-        yield line(row.name, row.printed.decay_per_s, f"{row.material.decay_per_s(row.printed.damped_hz):.2f}",
+        yield bench.row(row.name, row.printed.decay_per_s, f"{row.material.decay_per_s(row.printed.damped_hz):.2f}",
                    f"{decay:.2f}", f"{math.log(1000) / decay:.3g}")
 
 
 def time_table(rows, linear, best):
-    from errata import head, line
-    yield from head("row", "method, paper", "time, paper", "modes to 20 kHz", "CPU s, linear", "times less",
+    yield from bench.head("row", "method, paper", "time, paper", "modes to 20 kHz", "CPU s, linear", "times less",
                     "CPU s, quadratic (modes)")
     for row in rows:
         low, high = linear[row.name], best[row.name]
-        yield line(row.name, row.printed.method, clock(row.printed.seconds), len(low.modes), f"{low.cpu_s:.2f}",
+        yield bench.row(row.name, row.printed.method, clock(row.printed.seconds), len(low.modes), f"{low.cpu_s:.2f}",
                    f"{row.printed.seconds / low.cpu_s:,.0f}", f"{high.cpu_s:.2f} ({len(high.modes)})")
 
 
@@ -86,46 +71,37 @@ RATIOS = [("shelf (plastic)", "shelf (aluminum)"), ("shelf (wood)", "shelf (alum
 
 def ratio_table(rows, best):
     """Natural frequencies of rows that share a shape."""
-    from errata import head, line, possible_ratio
-    yield from head("rows", "the paper, damped as printed", "the paper, natural", "ours, natural", "possible")
+    from errata import possible_ratio
+    yield from bench.head("rows", "the paper, damped as printed", "the paper, natural", "ours, natural", "possible")
     for below, above in RATIOS:
         low, high = rows[below], rows[above]
         least, most = possible_ratio(low.material, high.material, 10 if below == "boxes" else 1)
-        yield line(f"{below} : {above}", f"1 : {high.printed.damped_hz / low.printed.damped_hz:.4f}",
+        yield bench.row(f"{below} : {above}", f"1 : {high.printed.damped_hz / low.printed.damped_hz:.4f}",
                    f"1 : {high.natural_hz / low.natural_hz:.4f}",
                    f"1 : {best[above].natural_hz / best[below].natural_hz:.4f}",
                    f"1 : {least:.4f} to {most:.4f}")
 
 
-# Table 2: ideal Hz, measured length in m and Hz, computed Hz, adjusted length in m and Hz.
-CHIMES = {"D3": (587.33, .505, 585.8, 589.17, .5061, 587.40), "E3": (659.26, .475, 656., 665.03, .4770, 659.27),
-          "G3": (783.99, .435, 781.8, 787.01, .4366, 784.06), "A4": (880., .410, 877.5, 884.70, .4115, 879.36),
-          "B4": (987.77, .388, 982.5, 984.75, .3878, 987.32), "D4": (1174.66, .353, 1167., 1186.88, .3548, 1174.67)}
-
-
 def chime_tables(solver, aluminum):
     """The lines of two tables, and the quadratic frequency of each chime at its measured length in Hz."""
-    import bodies
-    import table2
-    from errata import head, line
     options = ["--keep-surface", "--band", "20:2500", *aluminum.options()]
-    first = head("note", "length, m", "measured, Hz", "computed in the paper, Hz", "quadratic, Hz (nodes, CPU s)",
+    first = bench.head("note", "length, m", "measured, Hz", "computed in the paper, Hz", "quadratic, Hz (nodes, CPU s)",
                  "from measured", "beam theory, Hz", "linear, Hz (nodes, CPU s)", "from the paper's")
-    second = head("note", "ideal, Hz", "adjusted length, m", "the paper, Hz", "quadratic, Hz", "from the paper's",
+    second = bench.head("note", "ideal, Hz", "adjusted length, m", "the paper, Hz", "quadratic, Hz", "from the paper's",
                   "`tune`: length, m", "from the paper's", "Hz", "from the ideal, Hz", "solves")
     found, tuned_to = {}, {}
-    for note, (ideal, length, measured, computed, adjusted, tuned) in CHIMES.items():
+    for note, (ideal, length, measured, computed, adjusted, tuned) in table2.CHIMES.items():
         best = solver.solve(bodies.tube(length, 16, round(100 * length)), note, options)
         linear = solver.solve(bodies.tube(length, 48, 195), f"{note}, linear", [*options, "--element", "linear"])
         other = solver.solve(bodies.tube(adjusted, 16, round(100 * adjusted)), f"{note}, adjusted", options)
         found[note] = best.natural_hz
-        first.append(line(note, length, measured, computed, f"{best.natural_hz:.2f} ({best.nodes}, {best.cpu_s:.1f})",
+        first.append(bench.row(note, length, measured, computed, f"{best.natural_hz:.2f} ({best.nodes}, {best.cpu_s:.1f})",
                           percent(best.natural_hz, measured), f"{table2.timoshenko_hz(length):.2f}",
                           f"{linear.natural_hz:.2f} ({linear.nodes}, {linear.cpu_s:.1f})",
                           percent(linear.natural_hz, computed)))
         ours = tune(solver.folder, note, length, ideal, options)
         tuned_to[note] = ours["frequency_hz"] - ideal
-        second.append(line(note, ideal, adjusted, tuned, f"{other.natural_hz:.2f}", percent(other.natural_hz, tuned),
+        second.append(bench.row(note, ideal, adjusted, tuned, f"{other.natural_hz:.2f}", percent(other.natural_hz, tuned),
                            f"{ours['length_m']:.4f}", f"{1000 * (ours['length_m'] - adjusted):+.1f} mm",
                            f"{ours['frequency_hz']:.2f}", f"{tuned_to[note]:+.2f}", ours["solves"]))
     return first, second, found, max(map(abs, tuned_to.values()))
@@ -133,12 +109,10 @@ def chime_tables(solver, aluminum):
 
 def tune(folder, note, length, ideal_hz, options):
     """What `carillon model tune` makes of a chime of the measured length."""
-    import bodies
     import meshes
-    import programs
     path = folder / f"{note}_measured.obj"
     path.write_bytes(meshes.obj(*bodies.tube(length, 16, round(100 * length))))
-    with tempfile.TemporaryDirectory(prefix="carillon-") as own, programs.Studio(own) as studio:
+    with programs.studio() as studio:
         studio.command("model", "create", path, "--label", note, "--wait", *options)
         return json.loads(studio.command("--json", "model", "tune", note, "--to", ideal_hz, "--by", "length"))
 
@@ -151,12 +125,12 @@ def compute(options, folder):
     import mode_shapes
     import rows as paper
     import sound_models
-    solver = paper.Solver(options.build / "bin/carillon-precompute", folder)
+    solver = paper.Solver(options.build, folder)
     rows = {row.name: row for row in paper.table1()}
     best = {name: solver.best(row) for name, row in rows.items()}
     linear = {name: solver.as_in_paper(row) for name, row in rows.items()}
     chimes, tuned, found, out_of_tune_hz = chime_tables(solver, rows["chime (D3)"].material)
-    errors = errata.table(rows, best, (CHIMES["D3"][2], found["D3"]))
+    errors = errata.table(rows, best, (table2.CHIMES["D3"][2], found["D3"]))
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
     mode_shapes.figure3(folder, rows["bowl 1"], best["bowl 1"], pictures / "figure3.png")
@@ -169,7 +143,7 @@ def compute(options, folder):
     filled = {name: "\n".join(lines) for name, lines in tables.items()}
     filled |= sentences(rows, linear, best, peaks)
     filled |= {f"{name}_peaks": ", ".join(f"{hz:.0f}" for hz in highest) for name, highest in responses.items()}
-    worst = max(abs(found[note] / chime[2] - 1) for note, chime in CHIMES.items())
+    worst = max(abs(found[note] / chime[2] - 1) for note, chime in table2.CHIMES.items())
     filled["worst_chime"] = f"{100 * worst:.2f}"
     return filled, worst < .02 and out_of_tune_hz < 1 and "refuted" not in filled["errors"]
 
@@ -191,9 +165,10 @@ def sentences(rows, linear, best, peaks):
 
 
 def main():
-    options = arguments()
-    options.build, options.out = options.build.resolve(), options.out.resolve()
-    take(options.build)
+    parser = bench.parser(__doc__)
+    parser.add_argument("--out", type=pathlib.Path, default=bench.ROOT / "docs")
+    options = parser.parse_args()
+    bench.use(options.build, "client_sdk/examples/falls")
     with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
         filled, good = compute(options, pathlib.Path(folder))
     page = string.Template((HERE / "REPRODUCTION.md.in").read_text()).substitute(filled)

@@ -3,11 +3,10 @@
 
 import dataclasses
 import math
-import os
 import pathlib
-import tempfile
 import wave
 
+import bench
 import catalogue
 import mode_shapes
 import numpy
@@ -57,7 +56,7 @@ def sounds(solver, case, row):
     solver.solve(row.fine(), name, [*row.options, "--band", f"20:{HIGHEST_HZ}", *row.material.options()])
     vertices = mode_shapes.arrays_of(solver.folder, name)["vertices"]
     made = {}
-    with tempfile.TemporaryDirectory(prefix="carillon-") as own, programs.Studio(own) as studio:
+    with programs.studio() as studio:
         model = studio.import_model(solver.folder / f"{name}.model")
         studio.radiate(model, row.material.figures(), "--accuracy", ACCURACY_DB, "--budget", BUDGET_S)
         for variant, (heard, duration_s) in variants(case, row, model).items():
@@ -92,10 +91,7 @@ def save(path, sound):
 
 def draw(made, path):
     """A spectrogram of the first and the last variant of each body, on one scale of sound pressure level."""
-    os.environ.setdefault("MPLCONFIGDIR", tempfile.gettempdir())
-    import matplotlib
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
+    pyplot = bench.pyplot()
     figure, axes = pyplot.subplots(2, len(made), figsize=(9, 4.6), layout="constrained", sharex="col", sharey=True)
     for column, (title, variants_made) in zip(axes.T, made.items()):
         shown_s = min(SPAN_S, 1.2 * max(levels(variants_made[name])[3] for name in (PAPER, OURS)))
@@ -117,8 +113,7 @@ def draw(made, path):
 
 def compare(solver, rows, picture, folder):
     """Draws the picture and leaves each sound in the folder. Returns the lines of the table."""
-    from errata import head, line
-    lines = head("body", "sound model", "peak at 1 m, Pa", "exposure level, dB", "half of the energy below, Hz",
+    lines = bench.head("body", "sound model", "peak at 1 m, Pa", "exposure level, dB", "half of the energy below, Hz",
                  "40 dB below after, s")
     pathlib.Path(folder).mkdir(parents=True, exist_ok=True)
     made = {}
@@ -126,7 +121,7 @@ def compare(solver, rows, picture, folder):
         made[case.title] = sounds(solver, case, rows[case.row])
         for name, sound in made[case.title].items():
             peak, exposure, middle, lasts = levels(sound)
-            lines.append(line(case.title, name, f"{peak:.3g}", f"{exposure:.1f}", f"{middle:.0f}", f"{lasts:.2f}"))
+            lines.append(bench.row(case.title, name, f"{peak:.3g}", f"{exposure:.1f}", f"{middle:.0f}", f"{lasts:.2f}"))
         for name, word in ((PAPER, "paper"), (OURS, "carillon")):
             save(pathlib.Path(folder) / f"{case.title}_{word}.wav", made[case.title][name])
     draw(made, picture)

@@ -15,7 +15,6 @@ What one part has computed is used by the next. `--every 1` compares all modes, 
 and errors only those modes of a body count whose finer surface has at most --most-vertices.
 """
 
-import argparse
 import functools
 import json
 import math
@@ -26,7 +25,9 @@ import tempfile
 import time
 import typing
 
-sys.path[:0] = [str(pathlib.Path(__file__).parents[1] / folder) for folder in ("decomposition", "truth")]
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parent / folder) for folder in ("", "decomposition", "truth")]
+import bench  # noqa: E402
 import bodies  # noqa: E402
 import catalogue  # noqa: E402
 
@@ -53,13 +54,10 @@ def report_of(build, folder, name, settings):
     mesh = folder / f"{name}.obj"
     if not mesh.exists():
         bodies.write_obj(mesh, *make())
-    command = [build / "bin/carillon-precompute", mesh, "--out", folder / name, "--material", material, "--json",
-               "--threads", settings.threads, "--band", settings.band, "--transfer", "--transfer-accuracy",
-               settings.goal_db, "--transfer-budget", settings.budget_s]
     begun = time.monotonic()
-    done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL)
-    report = json.loads(done.stdout)
+    report = bench.decompose(build, mesh, folder / name, "--material", material, "--threads", settings.threads,
+                             "--band", settings.band, "--transfer", "--transfer-accuracy", settings.goal_db,
+                             "--transfer-budget", settings.budget_s)
     report["wall_s"] = time.monotonic() - begun
     return report
 
@@ -73,9 +71,8 @@ def decibels(ratio):
 
 
 def loudness(options, folder):
-    print("| body | mode | Hz | efficiency, dB | against the coupling, dB | decay by radiation, 1/s | "
-          "stated error, dB |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    bench.print_head("body", "mode", "Hz", "efficiency, dB", "against the coupling, dB", "decay by radiation, 1/s",
+                     "stated error, dB")
     for name in options.only:
         modes = radiate(options, folder, name, options.goal)["modes"]
         for number, mode in list(enumerate(modes, 1))[::max(1, len(modes) // options.rows)]:
@@ -83,8 +80,8 @@ def loudness(options, folder):
             if not found["computed"]:
                 continue
             change = 2 * decibels(found["pressure_at_1m_pa"] / (PASCALS_PER_COUPLING * mode["coupling"]))
-            print(f"| {name} | {number} | {mode['frequency_hz']:.0f} | {decibels(found['efficiency']):.1f} | "
-                  f"{change:+.1f} | {found['decay_rate_per_s']:.3g} | {found['power_error_db']:.2f} |", flush=True)
+            bench.print_row(name, number, f"{mode['frequency_hz']:.0f}", f"{decibels(found['efficiency']):.1f}",
+                            f"{change:+.1f}", f"{found['decay_rate_per_s']:.3g}", f"{found['power_error_db']:.2f}")
 
 
 @functools.cache
@@ -93,9 +90,7 @@ def model_of(build, folder, name):
     make, material = BODIES[name]
     mesh, model = folder / f"{name}.obj", folder / f"{name}.model"
     bodies.write_obj(mesh, *make())
-    command = [build / "bin/carillon-precompute", mesh, "--out", model, "--material", material, "--accuracy", "5%",
-               "--band", "20:20000"]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    bench.decompose(build, mesh, model, "--material", material, "--accuracy", "5%", "--band", "20:20000")
     return model
 
 
@@ -119,44 +114,43 @@ def share(values, bound):
 
 
 def errors(options, folder):
-    print("| body | modes compared | power within 0.5 dB | 95 %, dB | worst, dB | directions within 1.5 dB | "
-          "worst, dB | power, worst over stated | directions, worst over stated | finer surface too large |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    bench.print_head("body", "modes compared", "power within 0.5 dB", "95 %, dB", "worst, dB",
+                     "directions within 1.5 dB", "worst, dB", "power, worst over stated",
+                     "directions, worst over stated", "finer surface too large")
     for name in options.only:
         found = compare(options, folder, name)
         modes = found["checked"]
         if not modes:
-            print(f"| {name} | 0 of {found['computed']} | | | | | | | | {found['too_large']} |", flush=True)
+            bench.print_row(name, f"0 of {found['computed']}", *[""] * 7, found["too_large"])
             continue
         power = sorted(abs(mode["power_db"]) for mode in modes)
         direction = sorted(mode["direction_db"] for mode in modes)
         over = {kind: max(abs(mode[f"{kind}_db"]) / mode[f"stated_{kind}_db"] for mode in modes)
                 for kind in ("power", "direction")}
-        print(f"| {name} | {len(modes)} of {found['computed']} | {share(power, .5)} | "
-              f"{power[int(.95 * len(power))]:.2f} | {power[-1]:.2f} | {share(direction, 1.5)} | {direction[-1]:.2f} | "
-              f"{over['power']:.2f} | {over['direction']:.2f} | {found['too_large']} |", flush=True)
+        bench.print_row(name, f"{len(modes)} of {found['computed']}", share(power, .5),
+                        f"{power[int(.95 * len(power))]:.2f}", f"{power[-1]:.2f}", share(direction, 1.5),
+                        f"{direction[-1]:.2f}", f"{over['power']:.2f}", f"{over['direction']:.2f}", found["too_large"])
 
 
 def dense(options, folder):
-    print("| body | all modes, CPU s | modes | vertices | iterations | sweeps, CPU s | assembly, CPU s | LU, CPU s |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    bench.print_head("body", "all modes, CPU s", "modes", "vertices", "iterations", "sweeps, CPU s", "assembly, CPU s",
+                     "LU, CPU s")
     for name in options.only:
         found = compare(options, folder, name)
         one = found.get("dense")
         if one:
-            print(f"| {name} | {found['cpu_s']:.1f} | {found['computed']} | {one['vertices']} | {one['iterations']} | "
-                  f"{one['sweeps_s']:.2f} | {one['assembly_s']:.1f} | {one['factors_s']:.1f} |", flush=True)
+            bench.print_row(name, f"{found['cpu_s']:.1f}", found["computed"], one["vertices"], one["iterations"],
+                            f"{one['sweeps_s']:.2f}", f"{one['assembly_s']:.1f}", f"{one['factors_s']:.1f}")
 
 
 def cost(options, folder):
-    print("| body | threads | modes | radiation, CPU s | all, wall s |")
-    print("| --- | --- | --- | --- | --- |")
+    bench.print_head("body", "threads", "modes", "radiation, CPU s", "all, wall s")
     for name in options.only:
         for threads in (1, 2):
             report = radiate(options, folder, name, options.goal, threads)
             found = report["radiation"]
-            print(f"| {name} | {threads} | {found['modes_computed']} of {found['modes_wanted']} | "
-                  f"{found['cpu_seconds']:.1f} | {report['wall_s']:.1f} |", flush=True)
+            bench.print_row(name, threads, f"{found['modes_computed']} of {found['modes_wanted']}",
+                            f"{found['cpu_seconds']:.1f}", f"{report['wall_s']:.1f}")
 
 
 def fork(options, _folder):
@@ -166,15 +160,10 @@ def fork(options, _folder):
 PARTS = {"fork": fork, "dense": dense, "loudness": loudness, "errors": errors, "cost": cost}
 
 
-def names(text):
-    return text.split(",")
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True, help="the release build's folder")
-    parser.add_argument("--parts", type=names, default=list(PARTS), help="some of " + ",".join(PARTS))
-    parser.add_argument("--only", type=names, default=list(BODIES), help="bodies, by name")
+    parser = bench.parser(__doc__)
+    parser.add_argument("--parts", type=bench.names, default=list(PARTS), help="some of " + ",".join(PARTS))
+    parser.add_argument("--only", type=bench.names, default=list(BODIES), help="bodies, by name")
     parser.add_argument("--goal", type=float, default=.5, help="accuracy of the power, dB")
     parser.add_argument("--every", type=int, default=8, help="of how many modes one is compared with a finer surface")
     parser.add_argument("--most-vertices", type=int, default=16000, help="of a finer surface")

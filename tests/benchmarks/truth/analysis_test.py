@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """A synthetic recording of known modes must come back."""
 
@@ -68,7 +67,3 @@ class LikenessTest(unittest.TestCase):
         sound = ringing([(1000, 1, 1), (4000, 1, 0.1)])
         one, _, four, _, _ = likeness.octave_levels_db(sound, RATE_HZ)
         self.assertAlmostEqual(one - four, 20, delta=0.1)
-
-
-if __name__ == "__main__":
-    unittest.main()

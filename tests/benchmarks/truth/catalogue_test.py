@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue as Python reads it, and the page that is printed from it."""
 
@@ -29,7 +28,3 @@ class CatalogueTest(unittest.TestCase):
     def test_the_page_has_the_tables_of_today(self):
         text = materials.PAGE.read_text()
         self.assertEqual(text, materials.page_with_tables(text), "run tests/benchmarks/truth/materials.py --write")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,6 @@
 
 import dataclasses
 import math
-import pathlib
 import random
 
 import numpy
@@ -131,15 +130,15 @@ def blows(surface, mass_kg, duration_s=None):
     return found
 
 
-def decompose(folder, body):
-    """The body's model file."""
+def decompose(studio, body):
+    """The name of the body's stored model."""
     import bodies
 
-    stem = pathlib.Path(folder) / body.name.replace(" ", "-")
-    bodies.write_obj(stem.with_suffix(".obj"), *body.surface())
+    mesh, out = (studio.folder / f"{body.name}.{suffix}" for suffix in ("obj", "model"))
+    bodies.write_obj(mesh, *body.surface())
     wall = ["--wall", body.wall_m] if body.wall_m else []
-    programs.decompose(stem.with_suffix(".obj"), stem.with_suffix(".model"), "--material", body.material, *wall)
-    return stem.with_suffix(".model")
+    studio.decompose(mesh, out, "--material", body.material, *wall)
+    return studio.import_model(out)
 
 
 def click_db(modes, whole):
@@ -150,17 +149,16 @@ def click_db(modes, whole):
     return 10 * math.log10((click**2).sum() / max((numpy.asarray(modes, dtype=float)**2).sum(), 1e-30))
 
 
-def hear(studio, model_file, body, before, modes_only=False):
+def hear(studio, model, body, before=False, modes_only=False):
     """The Drop by the laws of version 0.1 (Rayleigh damping, soft contacts, the paper's coupling) or of today, which
     may be left without the sound of the body's acceleration.
     """
-    model = studio.import_model(model_file)
     material = catalogue.read()[body.material]
     figures = {"young_pa": material.young_pa, "density_kg_per_m3": material.density_kg_per_m3,
                **(rayleigh(body.rayleigh_eta) if before else programs.loss_factor(material.loss_factor))}
-    radiates = not before and studio.radiate(model, figures)
-    heard = programs.Heard(model, figures, paper_coupling=not radiates, gaussian=before,
-                           modes_only=bool(modes_only and radiates))
+    if not before:
+        studio.radiate(model, figures)
+    heard = programs.Heard(model, figures, paper_coupling=before, gaussian=before, modes_only=modes_only)
     mass_kg = body.volume_m3 * material.density_kg_per_m3
     sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)
     return Drop(body.name, sound, summary, mass_kg)

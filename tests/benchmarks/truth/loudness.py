@@ -4,19 +4,11 @@
 import dataclasses
 import math
 import statistics
-import subprocess
 
-import programs
+import bench
 
 # What the mixer makes of a unit of the paper's coupling: the density of air times 2 pi 1 kHz over 4 pi, Pa at 1 m.
 COUPLING_TO_PA = 1.204 * 2 * math.pi * 1000 / (4 * math.pi)
-
-
-@dataclasses.dataclass
-class Body:
-    name: str
-    surface: callable  # (vertices, triangles)
-    material: str
 
 
 @dataclasses.dataclass
@@ -37,31 +29,25 @@ HEAD = ("body", "material", "modes", "lowest mode, dB", "median, dB", "median ab
 
 
 def six_bodies():
+    """(name, surface, material) of each."""
     import bodies
     import drops
 
-    return (Body("chime, 403 mm", lambda: bodies.tube(0.403, 24, 96), "chime_aluminum"),
-            Body("bowl, 160 x 3 mm", lambda: bodies.bowl(0.08, 0.003, 64, 24), "porcelain"),
-            Body("bell, 100 mm", bodies.bell, "bell_bronze"),
-            Body("hollow bunny, 150 mm", lambda: bodies.bunny(0.15, 0.15 / 28, 0.004), "porcelain"),
-            Body("tumbler", drops.tumbler, "soda_lime_glass"),
-            Body("plate, 300 x 200 x 3 mm", lambda: bodies.box((0.3, 0.2, 0.003), (1, 1, 1)), "structural_steel"))
+    return (("chime, 403 mm", bodies.tube(0.403, 24, 96), "chime_aluminum"),
+            ("bowl, 160 x 3 mm", bodies.bowl(0.08, 0.003, 64, 24), "porcelain"),
+            ("bell, 100 mm", bodies.bell(), "bell_bronze"),
+            ("hollow bunny, 150 mm", bodies.bunny(0.15, 0.15 / 28, 0.004), "porcelain"),
+            ("tumbler", drops.tumbler(), "soda_lime_glass"),
+            ("plate, 300 x 200 x 3 mm", bodies.box((0.3, 0.2, 0.003), (1, 1, 1)), "structural_steel"))
 
 
-def can_radiate():
-    import daemon
-
-    command = [daemon.BIN / "carillon-precompute", "--help"]
-    return "--transfer" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
-
-def measure(folder, body):
+def measure(build, folder, surface, material):
     """The Difference of a body's modes, those that were computed."""
     import bodies
 
     mesh = folder / "body.obj"
-    bodies.write_obj(mesh, *body.surface())
-    report = programs.decompose(mesh, folder / "body.model", "--material", body.material, "--transfer")
+    bodies.write_obj(mesh, *surface)
+    report = bench.decompose(build, mesh, folder / "body.model", "--material", material, "--transfer")
     modes = [mode for mode in report["modes"] if mode["radiation"]["computed"]]
     return Difference([mode["frequency_hz"] for mode in modes],
                       [20 * math.log10(mode["radiation"]["pressure_at_1m_pa"] / (COUPLING_TO_PA * mode["coupling"]))

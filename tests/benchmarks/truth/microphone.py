@@ -7,11 +7,13 @@ modes, whose frequencies and decays are known, and each is given the strength an
 microphone."""
 
 import dataclasses
+import itertools
 import math
 
 import numpy
 from scipy import special
 
+import bench
 import rings
 
 DISTANCES_M = (0.06, 0.1, 0.2, 1.0)
@@ -29,35 +31,13 @@ class Transfer:
 
 def read(path):
     """The first transfer in a file that `carillon model export` has written."""
-    from carillon.v1 import modal_model_pb2, transfer_pb2
-    from google.protobuf.internal.decoder import _DecodeVarint32
+    import scripted
+    from carillon.v1 import transfer_pb2
 
-    content, at, header, chunks = path.read_bytes(), 0, None, []
-    while at < len(content):
-        size, at = _DecodeVarint32(content, at)
-        outer = modal_model_pb2.ModalModelRecord.FromString(content[at:at + size])
-        at += size
-        if not outer.transfer:
-            continue
-        record = transfer_pb2.TransferRecord.FromString(outer.transfer)
-        if record.HasField("chunk"):
-            chunks.append(record.chunk)
-        elif header is None:
-            header = record.header
-        else:
-            break
-    return Transfer(header, {array.name: values_of(array, number, chunks)
-                             for number, array in enumerate(header.arrays)})
-
-
-def values_of(array, number, chunks):
-    """The numbers of an array."""
-    from carillon.v1 import modal_model_pb2
-
-    kinds = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEMENT_TYPE_FLOAT64: "<f8",
-             modal_model_pb2.ELEMENT_TYPE_UINT32: "<u4"}
-    data = b"".join(chunk.data for chunk in chunks if chunk.array == number)
-    return numpy.frombuffer(data, kinds[array.type]).reshape(tuple(array.shape))
+    records = [transfer_pb2.TransferRecord.FromString(record.transfer) for record in scripted.read_records(path)
+               if record.transfer]
+    header, chunks = records[0].header, itertools.takewhile(lambda record: record.HasField("chunk"), records[1:])
+    return Transfer(header, bench.arrays_of(header, [record.chunk for record in chunks]))
 
 
 def harmonics(index, polar, azimuth):

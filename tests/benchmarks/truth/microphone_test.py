@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Fields at microphones against closed forms of monopoles and dipoles."""
 
@@ -60,7 +59,3 @@ class MicrophoneTest(unittest.TestCase):
         across = rings.ring_near(heard[distance, math.pi / 2, azimuth], HZ[0])
         self.assertAlmostEqual(across.amplitude, 1 / distance, delta=0.03 / distance)
         self.assertIsNone(rings.ring_near(heard[distance, math.pi / 2, azimuth], HZ[1]))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,13 +3,10 @@
 
 import math
 
-import matplotlib
 import numpy
 
+import bench
 import rings
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
 
 WINDOW, RANGE_DB = 512, 70
 QUIETEST_DB = -160  # a sound whose loudest point is below it stays black
@@ -17,9 +14,10 @@ QUIETEST_DB = -160  # a sound whose loudest point is below it stays black
 
 def draw(sounds, path, seconds, columns=4):
     """Draws [(title, samples)] to a PNG file, each on a scale of its own loudest point, and says where."""
+    pyplot = bench.pyplot()
     rows = math.ceil(len(sounds) / columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(3.1 * columns, 2.1 * rows), sharex=True, sharey=True,
-                                squeeze=False)
+    figure, axes = pyplot.subplots(rows, columns, figsize=(3.1 * columns, 2.1 * rows), sharex=True, sharey=True,
+                                   squeeze=False)
     for axis in axes.flat[len(sounds):]:
         axis.axis("off")
     for axis, (title, samples) in zip(axes.flat, sounds):
@@ -36,5 +34,5 @@ def draw(sounds, path, seconds, columns=4):
         axis.tick_params(axis="x", labelsize=7)
     figure.tight_layout()
     figure.savefig(path, dpi=90)
-    plt.close(figure)
+    pyplot.close(figure)
     print(f"drawn: {path}\n")

@@ -3,37 +3,25 @@
 """How true Carillon sounds: materials beside recorded bodies, a recorded bar, five drops.
 
     run.py --build BUILD [--recordings FOLDER] [--parts materials,loudness,bar,drops] [--pictures FOLDER]
-           [--before BUILD]
 
-Prints Markdown tables and draws spectrograms. With --before the drops by the laws of version 0.1 are rendered by the
-programs of another build folder. deploy/truth.sh installs what this needs.
+Prints Markdown tables and draws spectrograms. deploy/truth.sh installs what this needs.
 """
 
-import argparse
-import contextlib
 import math
 import pathlib
 import sys
 import tempfile
 
-import bar
-import drops
-import likeness
-import loudness
-import materials
-import pictures
-import programs
-import rings
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, required=True)
-    parser.add_argument("--recordings", type=pathlib.Path)
-    parser.add_argument("--parts", default="materials,loudness,bar,drops")
-    parser.add_argument("--pictures", type=pathlib.Path)
-    parser.add_argument("--before", type=pathlib.Path)
-    return parser.parse_args()
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+import bench  # noqa: E402
+import bar  # noqa: E402
+import drops  # noqa: E402
+import likeness  # noqa: E402
+import loudness  # noqa: E402
+import materials  # noqa: E402
+import pictures  # noqa: E402
+import programs  # noqa: E402
+import rings  # noqa: E402
 
 
 def print_table(lines):
@@ -46,24 +34,13 @@ def show_materials(_):
         print_table(lines)
 
 
-@contextlib.contextmanager
-def studio(build=None):
-    """A daemon, and a folder for meshes and models."""
-    with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-        with programs.Studio(folder, build and build / "bin") as opened:
-            yield opened, pathlib.Path(folder)
-
-
-def show_loudness(_):
+def show_loudness(options):
     print("## Loudness by mode: radiation over the paper's coupling\n")
-    if not loudness.can_radiate():
-        print("skipped: this carillon-precompute cannot compute radiation\n")
-        return
-    print("\n".join(materials.head(*loudness.HEAD)))
+    bench.print_head(*loudness.HEAD)
     with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-        for body in loudness.six_bodies():
-            difference = loudness.measure(pathlib.Path(folder), body)
-            print(materials.row(body.name, body.material, *difference.line()), flush=True)
+        for name, surface, material in loudness.six_bodies():
+            difference = loudness.measure(options.build, pathlib.Path(folder), surface, material)
+            bench.print_row(name, material, *difference.line())
     print()
 
 
@@ -103,15 +80,15 @@ def show_bar(options):
     found = {hz: rings.ring_near(whole, hz) for hz in bar.HIGH_HZ}
     recorded = {hz: ring.decay_per_s for hz, ring in found.items() if ring}
     print("## The recorded bar\n")
-    with studio() as (opened, folder):
-        answer = bar.first_fit(opened, folder, path)
+    with programs.studio() as studio:
+        answer = bar.first_fit(studio, path)
         print_table(fit_lines(answer))
-        print("\n".join(materials.head("", "MRSTFT", "octaves, dB", "decays, factor",
-                                   *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ), "struck at, mm", "microphone")
-                    + [materials.row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "", "")]))
+        bench.print_head("", "MRSTFT", "octaves, dB", "decays, factor", *(f"{hz} Hz, 1/s" for hz in bar.HIGH_HZ),
+                         "struck at, mm", "microphone")
+        bench.print_row("recording", "", "", "", *(f"{recorded[hz]:.3g}" for hz in bar.HIGH_HZ), "", "")
         results = []
-        for variant in bar.variants(opened, folder, path, recording, answer):
-            results.append(bar.measure(opened, recording, variant))
+        for variant in bar.variants(studio, path, recording, answer):
+            results.append(bar.measure(studio, recording, variant))
             print(result_line(results[-1], recorded), flush=True)
         print()
     pictures.draw([("recording", recording)] + [(result.name, result.sound) for result in results],
@@ -130,16 +107,15 @@ def drop_line(when, drop):
 
 def show_drops(options):
     print("## Five drops\n")
-    print("\n".join(materials.head("body", "laws", "peak, Pa", "dB(A), fast",
-                               *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
-                               "40 dB down after, s", "loudest 0.4 s, LUFS")))
-    with studio(options.before) as (old, _), studio() as (new, folder):
+    bench.print_head("body", "laws", "peak, Pa", "dB(A), fast", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
+                     "40 dB down after, s", "loudest 0.4 s, LUFS")
+    with programs.studio() as studio:
         pairs, energies = [], []
         for body in drops.BODIES:
-            model_file = drops.decompose(folder, body)
-            before = drops.hear(old, model_file, body, before=True)
-            modes = drops.hear(new, model_file, body, before=False, modes_only=True)
-            after = drops.hear(new, model_file, body, before=False)
+            model = drops.decompose(studio, body)
+            before = drops.hear(studio, model, body, before=True)
+            modes = drops.hear(studio, model, body, modes_only=True)
+            after = drops.hear(studio, model, body)
             pairs += [(f"{body.name}, {laws}", drop.sound)
                       for laws, drop in (("before", before), ("modes only", modes), ("now", after))]
             print(drop_line("before", before), drop_line("modes only", modes), drop_line("now", after), sep="\n",
@@ -156,9 +132,13 @@ def show_drops(options):
 
 
 if __name__ == "__main__":
-    options = arguments()
+    parser = bench.parser(__doc__)
+    parser.add_argument("--recordings", type=pathlib.Path)
+    parser.add_argument("--parts", type=bench.names, default=["materials", "loudness", "bar", "drops"])
+    parser.add_argument("--pictures", type=pathlib.Path)
+    options = parser.parse_args()
     options.pictures = options.pictures or options.build / "truth"
     options.pictures.mkdir(parents=True, exist_ok=True)
-    programs.use(options.build)
-    for part in options.parts.split(","):
+    bench.use(options.build, "tests/benchmarks/decomposition")
+    for part in options.parts:
         {"materials": show_materials, "loudness": show_loudness, "bar": show_bar, "drops": show_drops}[part](options)
