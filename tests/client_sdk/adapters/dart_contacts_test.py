@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The adapter for DART with its engine: a box falls, slides and rests."""
 
@@ -47,7 +46,3 @@ class DartContactsTest(unittest.TestCase):
             pass
         drop.contacts.remove_object(drop.body)
         self.assertEqual([drop.step() for _ in range(3)], [{}] * 3)
-
-
-if __name__ == "__main__":
-    unittest.main()

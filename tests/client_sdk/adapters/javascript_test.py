@@ -16,7 +16,3 @@ class JavascriptAdaptersTest(unittest.TestCase):
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120)
         self.assertEqual(done.returncode, 0, done.stdout)
         self.assertNotIn("# pass 0", done.stdout.replace("ℹ", "#"))
-
-
-if __name__ == "__main__":
-    unittest.main()

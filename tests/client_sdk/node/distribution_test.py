@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The package for Node as it is distributed: an archive that works alone, and types that TypeScript believes."""
 
@@ -116,7 +115,3 @@ class DistributionTest(unittest.TestCase):
                       "node16", "--types", "node", *sorted(self.folder.glob("*.ts")), cwd=self.folder)
         faults = re.findall(r"(?m)^(\S+)\(\d+,\d+\): error", said)
         self.assertEqual(sorted(set(faults)), [f"wrong{i}.ts" for i in range(len(wrong))], said)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """The Python package as it is distributed: a wheel, a source distribution that builds alone, and its types."""
 
@@ -77,7 +76,3 @@ class DistributionTest(unittest.TestCase):
     def test_types_are_right(self):
         run("mypy", "--config-file", pathlib.Path(__file__).with_name("mypy.ini"), "--cache-dir", self.folder / "cache",
             "carillon", cwd=BUILT)
-
-
-if __name__ == "__main__":
-    unittest.main()

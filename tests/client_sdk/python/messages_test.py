@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """What the Python package tells its callers without a daemon: warnings, refusals in their own names, short forms."""
 
@@ -31,8 +30,9 @@ def made(**content):
 
 class MessagesTest(unittest.TestCase):
     def setUp(self):
-        self.c = carillon.connect("unix:/nowhere")
-        self.addCleanup(self.c.close)
+        self.c = self.enterContext(carillon.connect("unix:/nowhere"))
+        self.scene = carillon.Scene(self.c, "scenes/1")
+        self.bell = carillon.SoundingObject(self.scene, scene_service_pb2.SoundingObject(handle=1))
 
     def refused(self, expected, function, *arguments, **named):
         with self.assertRaises((TypeError, ValueError)) as raised:
@@ -58,39 +58,31 @@ class RefusalsTest(MessagesTest):
         made = carillon.settings.to_settings({"poisson_ratio": 0.3}, "mm", 0.01)
         self.assertEqual((made.poisson_ratio, made.metres_per_unit, made.mesh.accuracy), (0.3, 0.001, 0.01))
         self.assertEqual(carillon.settings.to_settings(None, 2, None).metres_per_unit, 2)
-        for expected, wrong in (('unit is \'km\'; it must be "m", "cm", "mm", "in", or a number of metres above zero',
-                                 {"unit": "km"}), ("unit is 0; it must be", {"unit": 0}),
-                                ("accuracy is 1; it must be a number above 0 and below 1, such as 0.01 for 1 %",
-                                 {"accuracy": 1}), ("accuracy is '1%'; it must be", {"accuracy": "1%"}),
-                                ("unit and settings.metres_per_unit are both given; leave one of them out",
+        for expected, wrong in (("unit is 'km'", {"unit": "km"}), ("unit is 0", {"unit": 0}),
+                                ("accuracy is 1;", {"accuracy": 1}), ("accuracy is '1%'", {"accuracy": "1%"}),
+                                ("unit and settings.metres_per_unit",
                                  {"unit": "mm", "settings": {"metres_per_unit": 1}})):
             self.refused(expected, self.c.create_model, MESH, "oak", **wrong)
 
     def test_a_value_of_the_wrong_type_is_refused_by_the_name_of_its_argument(self):
-        self.refused("tail_s of render is 'long'; it must be a number", self.c.render, carillon.Trace(), tail_s="long")
-        scene = carillon.Scene(self.c, "scenes/1")
-        self.refused("handle of add is -1; it must be a whole number, zero or more", scene.add, "modalModels/1",
-                     handle=-1)
-        self.refused("material is of type int", scene.add, "modalModels/1", 7)
-        self.refused("give figures by carillon.material(young_pa=...", scene.add, "modalModels/1", {"young": 2e11})
-
-    def test_a_gain_that_is_no_number_is_refused_as_linear(self):
-        scene = carillon.Scene(self.c, "scenes/1")
-        bell = carillon.SoundingObject(scene, scene_service_pb2.SoundingObject(handle=1))
-        for where, call in (("update", bell.update), ("update", scene.update), ("set_volume", self.c.set_volume),
-                            ("scene", self.c.scene), ("add", functools.partial(scene.add, "modalModels/1")),
-                            ("add", functools.partial(carillon.Trace().add, "modalModels/1"))):
-            self.refused(f"gain of {where} is '0.5'; it must be a number. A gain is a linear factor: 1 keeps the "
-                         "level, and 10 ** (x / 20) changes it by x decibels", call, gain="0.5")
-        self.refused("size of update is 'big'; it must be a number", bell.update, size="big")
-        self.refused("muted of update is 'no'; it must be True or False", scene.update, muted="no")
-        self.refused("glide is '1'; it must be seconds", bell.update, glide="1")
-        self.refused("glide is '1'; it must be seconds", scene.move_listener, POINT, "1")
+        add, trace = functools.partial(self.scene.add, "modalModels/1"), carillon.Trace()
+        self.refused("tail_s of render is 'long'; it must be a number", self.c.render, trace, tail_s="long")
+        self.refused("handle of add is -1", add, handle=-1)
+        self.refused("material is of type int", add, 7)
+        self.refused("carillon.material(young_pa=...", add, {"young": 2e11})
+        for where, call in (("update", self.bell.update), ("update", self.scene.update),
+                            ("set_volume", self.c.set_volume), ("scene", self.c.scene), ("add", add),
+                            ("add", functools.partial(trace.add, "modalModels/1"))):
+            self.refused(f"gain of {where} is '0.5'; it must be a number", call, gain="0.5")
+        self.refused("size of update is 'big'", self.bell.update, size="big")
+        self.refused("muted of update is 'no'", self.scene.update, muted="no")
+        self.refused("glide is '1'; it must be seconds", self.bell.update, glide="1")
+        self.refused("glide is '1'; it must be seconds", self.scene.move_listener, POINT, "1")
 
     def test_columns_are_refused_by_their_names_with_unit_and_frame(self):
         contacts = carillon.Contacts
         for expected, given in (
-                ("points has the shape (2,); it must be N x 3: metres in the stream's frame, which is each object's",
+                ("points has the shape (2,); it must be N x 3: metres in the stream's frame",
                  contacts(1, (0, 0), IMPULSE)),
                 ("impulses is 'no'; it must be newton seconds in the stream's frame", contacts(1, POINT, "no")),
                 ("points has 1 row and impulses has 2", contacts(1, POINT, [IMPULSE] * 2)),
@@ -98,61 +90,35 @@ class RefusalsTest(MessagesTest):
                 ("partners has the shape (3,)", contacts(1, [POINT] * 2, [IMPULSE] * 2, partners=[1, 2, 3])),
                 ("second_points has 1 row; it must have 2", contacts(1, [POINT] * 2, [IMPULSE] * 2, second_objects=2,
                                                                      second_points=POINT)),
-                ("an entry of objects is None; it must be an object that Scene.add or Trace.add returned, or its "
-                 "handle, a whole number", contacts(None, POINT, IMPULSE)),
-                ("contacts is of type list; it must be a carillon.Contacts", [POINT])):
+                ("second_objects without second_points", contacts(1, POINT, IMPULSE, second_objects=2)),
+                ("second_points is 'no'", contacts(1, POINT, IMPULSE, second_objects=2, second_points="no")),
+                ("an entry of objects is None", contacts(None, POINT, IMPULSE)),
+                ("it must be real and not complex", contacts(1, POINT, numpy.array([[0, 0, 1 + 0j]]))),
+                ("contacts is of type list", [POINT])):
             self.refused(expected, made, contacts=given)
         self.refused("orientations has the shape (3,)", made, poses=carillon.Poses(1, POINT, (0, 0, 1)))
-        self.refused("listener is (1, 2); it must be a position x, y, z in metres", made, listener=(1, 2))
+        self.refused("listener is (1, 2)", made, listener=(1, 2))
         for wrong in (-1, 1e-4, 1e4, float("nan"), "slow"):
-            self.refused(f"time_scale is {wrong!r}; it must be simulation time over time of the sound, 0.001 to 1000, "
-                         "or 0 in a pause", made, time_scale=wrong)
+            self.refused(f"time_scale is {wrong!r}", made, time_scale=wrong)
+        for points in (numpy.array([[1j, 0, 0]]), [[numpy.complex128(1j), 0, 0]], [(1j, 0, 0)]):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                self.refused("points is ", made, contacts=contacts(1, points, IMPULSE))
 
-    def test_one_place_has_the_same_coordinates_for_both_objects_in_the_frame_of_the_scene_alone(self):
+    def test_one_place_has_the_same_coordinates_for_both_objects_in_the_frame_of_the_scene(self):
         given = carillon.Contacts(1, [(1, 2, 3)], [IMPULSE], second_objects=2)
-        self.refused("second_objects without second_points: each contact needs its place in the frame of its second "
-                     "object, too, unless the frame is \"scene\"", made, contacts=given)
-        self.refused("second_points is 'no'; it must be metres in the second object's own frame, or in the scene's",
-                     made, contacts=carillon.Contacts(1, POINT, IMPULSE, second_objects=2, second_points="no"))
         trace = carillon.Trace(step=0.01, frame="scene")
         trace.step(0, contacts=given)
         given.second_points = [(4, 5, 6)]
         trace.step(0, contacts=given)
         self.assertEqual([list(step.contact_columns[0].second_point_m) for step in trace.steps], [[1, 2, 3], [4, 5, 6]])
 
-    def test_complex_numbers_are_refused_by_the_name_of_their_argument(self):
-        for points in (numpy.array([[1j, 0, 0]]), [[numpy.complex128(1j), 0, 0]], [(1j, 0, 0)]):
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                self.refused("points is ", made, contacts=carillon.Contacts(1, points, IMPULSE))
-        self.refused("it must be real and not complex: newton seconds in the stream's frame", made,
-                     contacts=carillon.Contacts(1, POINT, numpy.array([[0, 0, 1 + 0j]])))
-
     def test_a_negative_duration_is_refused_and_an_undefined_one_is_left_to_the_daemon(self):
-        self.refused("an entry of durations is -5.0; it must be zero seconds or more, or NaN, which leaves it to the "
-                     "daemon", made, impacts=carillon.Impacts(1, POINT, IMPULSE, durations=[-5]))
-        bell = carillon.SoundingObject(carillon.Scene(self.c, "scenes/1"), scene_service_pb2.SoundingObject(handle=1))
-        self.refused("duration is -5; it must be zero seconds or more", bell.strike, POINT, IMPULSE, -5)
+        self.refused("an entry of durations is -5.0", made,
+                     impacts=carillon.Impacts(1, POINT, IMPULSE, durations=[-5]))
+        self.refused("duration is -5", self.bell.strike, POINT, IMPULSE, -5)
         step = made(impacts=carillon.Impacts(1, [POINT] * 2, [IMPULSE] * 2, durations=[numpy.nan, 0]))
         self.assertEqual(list(step.contact_columns[0].duration_s), [-1, 0])
-
-    def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_and_the_trace_can_be_continued(self):
-        trace = carillon.Trace()
-
-        def refused(expected, time):
-            with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:
-                trace.step(time)
-            self.assertEqual(raised.exception.reason, "INVALID_STREAM")
-
-        for time in (numpy.nan, numpy.inf, -1.1e10):
-            refused("the time of step 0 is", time)
-        trace.step(-1)
-        trace.step(2)
-        refused(r"time goes back from 2 s to 1\.5 s at step 2;", 1.5)
-        trace.step(2)
-        self.assertEqual([step.time_s for step in trace.steps], [-1, 2, 2])
-        trace.step(1795853690.812)
-        refused(r"time goes back from 1795853690\.812 s to 1795853690\.5 s at step 4;", 1795853690.5)
 
     def test_a_refusal_is_told_as_the_daemon_wrote_it_with_the_first_remedy(self):
         info = error_pb2.ErrorInfo(reason="INVALID", message="step_s is 0; say",
@@ -214,7 +180,7 @@ class WaitingTest(MessagesTest):
         self.c.contacts_stub = types.SimpleNamespace(
             RecordContacts=lambda request: Call(contact_service_pb2.RecordContactsResponse()))
         for block, arguments in ((self.c.recording(), (1,)),
-                                 (carillon.Scene(self.c, "scenes/1").recording_contacts(), ())):
+                                 (self.scene.recording_contacts(), ())):
             with self.assertRaisesRegex(carillon.ServerUnavailable, "no daemon answers at unix:/nowhere"):
                 with block as record:
                     record.take(*arguments)
@@ -311,7 +277,3 @@ class MeshFilesTest(unittest.TestCase):
         (self.folder / "BODY.ELE").write_text("elements\n")
         for name in ("BODY.NODE", "BODY.ELE"):
             self.assertEqual(carillon.meshes.read_mesh(self.folder / name).data, b"nodes\nelements\n")
-
-
-if __name__ == "__main__":
-    unittest.main()

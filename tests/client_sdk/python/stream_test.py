@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Which messages a contact stream of the Python package makes of the steps that wait for a slow network."""
 
@@ -28,47 +27,47 @@ class SlowStub:
 
 
 class StreamTest(unittest.TestCase):
+    def open_stream(self):
+        client = carillon.connect("unix:/nowhere")
+        client.contacts_stub = self.stub = SlowStub()
+        return carillon.ContactStream(client, START)
+
     def requests_of(self, row_counts):
         """The requests after the start, for steps that all wait and have these numbers of rows."""
-        stub = SlowStub()
-        client = carillon.connect("unix:/nowhere")
-        client.contacts_stub = stub
-        stream = carillon.ContactStream(client, START)
+        stream = self.open_stream()
         for number, count in enumerate(row_counts):
             row = contact_pb2.Contact(kind=contact_pb2.CONTACT_KIND_IMPACT, object=1, duration_s=1e-3)
             stream.send(contact_pb2.ContactStep(time_s=0.01 * number, contacts=[row] * count))
         stream.close(warn=False)
-        requests = list(stub.requests)
+        requests = list(self.stub.requests)
         self.assertEqual(requests.pop(0).start, START)
         return requests
 
-    def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_at_once_and_the_stream_goes_on(self):
-        stub = SlowStub()
-        client = carillon.connect("unix:/nowhere")
-        client.contacts_stub = stub
-        stream = carillon.ContactStream(client, START)
-
+    def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_at_once_and_the_next_one_is_taken(self):
         def refused(expected, send, argument):
             with self.assertRaisesRegex(carillon.CarillonError, expected) as raised:
                 send(argument)
             self.assertEqual(raised.exception.reason, "INVALID_STREAM")
 
-        for time in (math.nan, math.inf, -1.1e10):
-            refused("the time of step 0 is", stream.step, time)
-        # A simulation may begin at a time below zero, and two steps may have the same time.
-        for time in (-1, numpy.float32(2), numpy.array([2.0])):
-            stream.step(time)
-        back = r"time goes back from 2 s to 1\.5 s at step 3; open another stream for another run"
-        refused(back, stream.step, 1.5)
-        refused(back, stream.send, contact_pb2.ContactStep(time_s=1.5))
+        stream, trace = self.open_stream(), carillon.Trace()
+        for target in stream, trace:
+            for time in (math.nan, math.inf, -1.1e10):
+                refused("the time of step 0 is", target.step, time)
+            # A simulation may begin at a time below zero, and two steps may have the same time.
+            for time in (-1, numpy.float32(2), numpy.array([2.0])):
+                target.step(time)
+            refused(r"from 2 s to 1\.5 s at step 3;", target.step, 1.5)
+            target.step(3)
+        refused(r"from 3 s to 1\.5 s at step 4;", stream.send, contact_pb2.ContactStep(time_s=1.5))
+        trace.step(1795853690.812)
+        refused(r"from 1795853690\.812 s to 1795853690\.5 s at step 5;", trace.step, 1795853690.5)
         for wrong in (None, "2.5", b"2.5", [2.5, 3]):
-            with self.assertRaises(ValueError) as raised:
+            with self.assertRaisesRegex(ValueError, "time is "):
                 stream.step(wrong)
-            self.assertEqual(str(raised.exception), f"time is {wrong!r}; it must be the simulation time in seconds")
-        stream.step(3)
         stream.close(warn=False)
-        steps = [step for request in stub.requests for step in request.steps]
+        steps = [step for request in self.stub.requests for step in request.steps]
         self.assertEqual([step.time_s for step in steps], [-1, 2, 2, 3])
+        self.assertEqual([step.time_s for step in trace.steps[:4]], [-1, 2, 2, 3])
 
     def test_small_steps_that_wait_are_sent_together_and_in_order(self):
         requests = self.requests_of([1] * 1000)
@@ -85,7 +84,3 @@ class StreamTest(unittest.TestCase):
     def test_a_stream_of_one_step_or_none_ends(self):
         self.assertEqual(self.requests_of([]), [])
         self.assertEqual([len(request.steps) for request in self.requests_of([3])], [1])
-
-
-if __name__ == "__main__":
-    unittest.main()
