@@ -6,7 +6,6 @@
 
 #include <string>
 
-#include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 
 namespace carillon::cli {
@@ -16,104 +15,75 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string kDigest(64, 'a');
-
-/// A daemon without models, and with one job, whose model it has yet to make.
-class DaemonWithJob : public client::Client {
+/// A daemon that lists these models and jobs.
+class FakeDaemon : public client::Client {
  public:
-  explicit DaemonWithJob(v1::JobState state) {
-    job_.set_name("jobs/" + kDigest);
-    job_.set_modal_model("modalModels/" + kDigest);
-    job_.set_label("bell");
-    job_.set_state(state);
-    if (state != v1::JOB_STATE_FAILED) return;
-    job_.mutable_error()->set_reason("MESH_NOT_CLOSED");
-    job_.mutable_error()->set_message("the surface has 12 open edges");
-  }
-
   absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
       const v1::ListModalModelsRequest&) const override {
-    return v1::ListModalModelsResponse();
+    return models;
   }
   absl::StatusOr<v1::ModalModelSummary> GetModalModel(const std::string& name) const override {
     return Refusal(absl::StatusCode::kNotFound, "MODAL_MODEL_NOT_FOUND", name);
   }
   absl::StatusOr<v1::ListJobsResponse> ListJobsPage(const v1::ListJobsRequest&) const override {
-    v1::ListJobsResponse list;
-    *list.add_jobs() = job_;
-    if (!other_.name().empty()) *list.add_jobs() = other_;
-    return list;
+    return jobs;
   }
 
-  v1::Job& job() { return job_; }
-  v1::Job& other() { return other_; }
-
- private:
-  v1::Job job_, other_;
+  v1::ListModalModelsResponse models;
+  v1::ListJobsResponse jobs;
 };
 
-std::string MessageOf(const client::Client& daemon, const std::string& text) {
+/// The job whose name and model have a digest of this digit.
+v1::Job Bell(v1::JobState state, char job = 'a', char model = 'a') {
+  v1::Job bell;
+  bell.set_name("jobs/" + std::string(64, job));
+  bell.set_modal_model("modalModels/" + std::string(64, model));
+  bell.set_label("bell");
+  bell.set_state(state);
+  return bell;
+}
+
+/// What is said of a model that is not there while the daemon has the job.
+std::string MessageOf(const v1::Job& job, const std::string& text) {
+  FakeDaemon daemon;
+  *daemon.jobs.add_jobs() = job;
   const v1::ErrorInfo error = ToErrorInfo(FindModel(daemon, text).status());
   EXPECT_EQ(error.reason(), "MODAL_MODEL_NOT_FOUND");
   return error.message();
 }
 
 TEST(FindJob, ALabelMeansTheJobThatHasNotEnded) {
-  DaemonWithJob daemon(v1::JOB_STATE_FAILED);
-  daemon.other() = daemon.job();
-  daemon.other().set_name("jobs/" + std::string(64, 'b'));
+  FakeDaemon daemon;
+  for (const char job : {'a', 'b'}) *daemon.jobs.add_jobs() = Bell(v1::JOB_STATE_FAILED, job);
   EXPECT_EQ(ToErrorInfo(FindJob(daemon, "bell").status()).reason(), "NAME_AMBIGUOUS");
-  daemon.other().set_state(v1::JOB_STATE_QUEUED);
-  EXPECT_EQ(FindJob(daemon, "bell").value(), daemon.other().name());
-  EXPECT_EQ(FindJob(daemon, "aaaa").value(), daemon.job().name());
+  daemon.jobs.mutable_jobs(1)->set_state(v1::JOB_STATE_QUEUED);
+  EXPECT_EQ(FindJob(daemon, "bell").value(), daemon.jobs.jobs(1).name());
+  EXPECT_EQ(FindJob(daemon, "aaaa").value(), daemon.jobs.jobs(0).name());
 }
 
 TEST(FindModel, SaysThatTheJobOfAModelWaitsOrRunsAndHowToWaitForIt) {
   for (const std::string& text :
-       {std::string("bell"), kDigest.substr(0, 5), "modalModels/" + kDigest}) {
-    EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_QUEUED), text),
-                AllOf(HasSubstr("is queued"), HasSubstr("`carillon job watch aaaaaaaaaaaa`"),
-                      HasSubstr("`carillon job show aaaaaaaaaaaa`"), HasSubstr("--wait")))
+       {std::string("bell"), std::string("aaaaa"), "modalModels/" + std::string(64, 'a')}) {
+    EXPECT_THAT(MessageOf(Bell(v1::JOB_STATE_QUEUED), text),
+                AllOf(HasSubstr("is queued"), HasSubstr("`carillon job watch aaaaaaaaaaaa`")))
         << text;
-    EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_RUNNING), text), HasSubstr("is running"));
+    EXPECT_THAT(MessageOf(Bell(v1::JOB_STATE_RUNNING), text), HasSubstr("is running"));
   }
 }
 
 TEST(FindModel, SaysNothingOfJobsThatDoNotMakeTheModel) {
-  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_RUNNING), "bowl"),
-              AllOf(HasSubstr("`carillon model list`"), Not(HasSubstr("job"))));
+  EXPECT_THAT(MessageOf(Bell(v1::JOB_STATE_RUNNING), "bowl"), Not(HasSubstr("job")));
   // The model was made and deleted since.
-  EXPECT_THAT(MessageOf(DaemonWithJob(v1::JOB_STATE_SUCCEEDED), "bell"), Not(HasSubstr("job")));
-  DaemonWithJob transfer(v1::JOB_STATE_RUNNING);
-  transfer.job().set_modal_model("modalModels/" + std::string(64, 'b'));
-  EXPECT_THAT(MessageOf(transfer, "bell"), Not(HasSubstr("job")));
+  EXPECT_THAT(MessageOf(Bell(v1::JOB_STATE_SUCCEEDED), "bell"), Not(HasSubstr("job")));
+  // A transfer's job has the model of another job.
+  EXPECT_THAT(MessageOf(Bell(v1::JOB_STATE_RUNNING, 'a', 'b'), "bell"), Not(HasSubstr("job")));
 }
 
-/// A daemon with `count` models of the same label.
-class DaemonWithModels : public client::Client {
- public:
-  explicit DaemonWithModels(int count) {
-    for (int i = 0; i < count; ++i) {
-      v1::ModalModelSummary& model = *list_.add_modal_models();
-      model.set_name("modalModels/" + std::string(64, static_cast<char>('a' + i)));
-      model.set_label("bell");
-    }
-  }
-  absl::StatusOr<v1::ListModalModelsResponse> ListModalModelsPage(
-      const v1::ListModalModelsRequest&) const override {
-    return list_;
-  }
-  const v1::ModalModelSummary& newest() const { return list_.modal_models(0); }
-
- private:
-  v1::ListModalModelsResponse list_;
-};
-
 TEST(FindModel, NamesTheNearestLabel) {
-  EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "bel").status().message()),
-              HasSubstr("did you mean 'bell'? `carillon model list`"));
-  EXPECT_THAT(std::string(FindModel(DaemonWithModels(2), "chime").status().message()),
-              Not(HasSubstr("did you mean")));
+  FakeDaemon daemon;
+  daemon.models.add_modal_models()->set_label("bell");
+  EXPECT_THAT(FindModel(daemon, "bel").status().ToString(), HasSubstr("did you mean 'bell'?"));
+  EXPECT_THAT(FindModel(daemon, "chime").status().ToString(), Not(HasSubstr("did you mean")));
 }
 
 }  // namespace

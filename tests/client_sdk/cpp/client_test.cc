@@ -31,7 +31,8 @@ TEST_F(ClientWithoutDaemon, IsToldSoByEveryKindOfCall) {
   const auto unavailable = HasSubstr("SERVER_UNAVAILABLE: ");
   EXPECT_THAT(client_->GetServerInfo().status().ToString(), unavailable);
   EXPECT_THAT(client_->IsServing("").status().ToString(), unavailable);
-  EXPECT_THAT(client_->GetMixer().status().ToString(), unavailable);
+  EXPECT_THAT(client_->GetMixer().status().ToString(),
+              AllOf(unavailable, HasSubstr("unix:/proc/no/such/socket")));
   EXPECT_THAT(client_->UploadMesh("v 0 0 0").status().ToString(), unavailable);
   EXPECT_THAT(client_->WatchJob("jobs/a", nullptr).status().ToString(), unavailable);
   EXPECT_THAT(client_->Listen({}, [](const AudioBlock&) { return true; }).ToString(), unavailable);

@@ -49,15 +49,11 @@ class MockContactStream : public ContactStream {
   MOCK_METHOD(absl::StatusOr<v1::StreamContactsResponse>, Finish, (), (override));
 };
 
-double ImpulseOf(const v1::ContactStep& step) {
-  return step.contacts(0).impulse_newton_seconds().z();
-}
-
 TEST(UsersCode, CanBeTestedWithAMockOfTheClient) {
   auto stream = std::make_unique<MockContactStream>();
   std::vector<double> impulses;
   EXPECT_CALL(*stream, Send).Times(2).WillRepeatedly([&](const v1::ContactStep& step) {
-    impulses.push_back(ImpulseOf(step));
+    impulses.push_back(step.contacts(0).impulse_newton_seconds().z());
     return absl::OkStatus();
   });
   EXPECT_CALL(*stream, Finish).WillOnce(Return(v1::StreamContactsResponse()));

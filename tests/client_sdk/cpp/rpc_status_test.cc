@@ -29,13 +29,6 @@ TEST(RpcStatus, CarriesReasonMessageAndFiguresOfTheRichStatus) {
   EXPECT_EQ(received.metadata().at("edge_count"), "12");
 }
 
-TEST(RpcStatus, NamesTheServerThatDoesNotAnswer) {
-  const absl::Status status =
-      FromRpc(grpc::Status(grpc::StatusCode::UNAVAILABLE, "refused"), "unix:/run/c.sock");
-  EXPECT_THAT(status.ToString(), HasSubstr("SERVER_UNAVAILABLE: "));
-  EXPECT_THAT(status.ToString(), HasSubstr("unix:/run/c.sock"));
-}
-
 TEST(RpcStatus, TellsHowToRepairAMessageThatIsTooLarge) {
   const absl::Status status =
       FromRpc(grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED,
