@@ -26,9 +26,11 @@ std::vector<MeasuredDecay> Decays(const std::function<double(double)>& law,
   return decays;
 }
 
+/// The decays of a constant loss factor of 0.1 %.
+double Constant(double hz) { return std::numbers::pi * hz * 1e-3; }
+
 TEST(FitDamping, FindsAConstantLossFactorInSpiteOfAGhost) {
-  const auto laws = FitDamping(Decays([](double hz) { return std::numbers::pi * hz * 1e-3; }),
-                               DampingKind::kAuto);
+  const auto laws = FitDamping(Decays(Constant), DampingKind::kAuto);
   ASSERT_GE(laws.size(), 4U);
   ASSERT_EQ(laws[0].kind, DampingKind::kEta);
   EXPECT_NEAR(laws[0].loss_factor[0].loss_factor, 1e-3, 3e-5);
@@ -53,9 +55,7 @@ TEST(FitDamping, LeavesToTheMaterialWhatTheBodyDoesNotRadiate) {
 }
 
 TEST(FitDamping, ATableFollowsALossThatRises) {
-  const auto law = [](double hz) {
-    return std::numbers::pi * hz * 1e-3 * std::pow(hz / 1000, 0.5);
-  };
+  const auto law = [](double hz) { return Constant(hz) * std::pow(hz / 1000, 0.5); };
   for (const DampingKind kind : {DampingKind::kAuto, DampingKind::kTable}) {
     const auto laws = FitDamping(Decays(law), kind);
     ASSERT_EQ(laws[0].kind, DampingKind::kTable);
@@ -68,11 +68,10 @@ TEST(LawErrors, HoldTheTruthInNineOfTenCases) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   const auto rayleigh = [](double hz) { return 2e-7 * hz * hz + 1; };
-  const auto eta = [](double hz) { return std::numbers::pi * hz * 1e-3; };
   int held = 0, all = 0;
   double sum = 0;
   for (int draw = 0; draw < 40; ++draw) {
-    const std::function<double(double)> law = draw % 2 == 0 ? rayleigh : std::function(eta);
+    const std::function<double(double)> law = draw % 2 == 0 ? rayleigh : std::function(Constant);
     std::vector<MeasuredDecay> decays;
     std::vector<double> frequencies_hz;
     for (int m = 0; m < 8; ++m) {
@@ -96,8 +95,7 @@ TEST(LawErrors, HoldTheTruthInNineOfTenCases) {
 }
 
 TEST(LawErrors, GrowBeyondTheDecaysAndWithWhatIsSaidOfThem) {
-  const auto law = [](double hz) { return std::numbers::pi * hz * 1e-3; };
-  std::vector<MeasuredDecay> decays = Decays(law);
+  std::vector<MeasuredDecay> decays = Decays(Constant);
   const auto laws = FitDamping(decays, DampingKind::kEta);
   const auto errors = LawErrors(decays, laws, {3000, 3000 * 16});
   EXPECT_LT(errors[0], 0.05);

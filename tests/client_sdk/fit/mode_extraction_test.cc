@@ -15,12 +15,6 @@ ExtractedModes Extract(const Recording& recording) {
   return ExtractModes(FindRings({recording}), [](double) {});
 }
 
-const MeasuredMode* Near(const std::vector<MeasuredMode>& modes, double hz) {
-  const auto nearest = std::ranges::min_element(
-      modes, {}, [hz](const MeasuredMode& mode) { return std::abs(mode.frequency_hz - hz); });
-  return nearest == modes.end() ? nullptr : &*nearest;
-}
-
 TEST(ExtractModes, FindsTheLinesOfASoundAndNoOthers) {
   const std::vector<TrueMode> truth = {{440, 2, 0.3},    {1237, 6, 0.2},    {3811.5, 12, 0.3},
                                        {3990, 20, 0.05}, {9020.3, 40, 0.2}, {15500, 60, 0.2}};
@@ -57,15 +51,16 @@ TEST(ExtractModes, TellsADecayFromThatOfTheRoom) {
   double deviation = 0;
   int known = 0;
   for (const TrueMode& mode : truth) {
-    const MeasuredMode* near = Near(found.modes, mode.frequency_hz);
-    ASSERT_NE(near, nullptr);
+    const auto near = std::ranges::min_element(found.modes, {}, [&](const MeasuredMode& one) {
+      return std::abs(one.frequency_hz - mode.frequency_hz);
+    });
+    ASSERT_NE(near, found.modes.end());
     if (near->decay_error_per_s > 0.45 * near->decay_per_s) continue;
     deviation += std::log(near->decay_per_s / mode.decay_per_s);
     ++known;
   }
   ASSERT_GE(known, 8);
-  deviation /= known;
-  EXPECT_NEAR(deviation, 0, 0.08)
+  EXPECT_NEAR(deviation / known, 0, 0.08)
       << "on average; without the room it is some -0.2 of those above 20";
 }
 

@@ -58,32 +58,26 @@ class NpzModel : public testing::Test {
 
 TEST_F(NpzModel, WhatIsWrittenIsReadBackToTheBit) {
   ASSERT_TRUE(WriteNpz(path_, model_).ok());
-  const auto read = ReadNpz(path_);
-  ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_EQ(read->eigenvalues, model_.eigenvalues);
-  EXPECT_EQ(read->residuals, model_.residuals);
-  EXPECT_EQ(read->couplings, model_.couplings);
-  EXPECT_EQ(read->vertices, model_.vertices);
-  EXPECT_EQ(read->triangles, model_.triangles);
-  EXPECT_EQ(read->given_triangle, model_.given_triangle);
-  EXPECT_EQ(read->given_vertices, model_.given_vertices);
-  EXPECT_EQ(read->given_triangles, model_.given_triangles);
-  EXPECT_EQ(read->shapes, model_.shapes);
-  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(read->header, model_.header))
-      << read->header.DebugString();
+  const StoredModel read = ReadNpz(path_).value();
+  EXPECT_EQ(read.eigenvalues, model_.eigenvalues);
+  EXPECT_EQ(read.residuals, model_.residuals);
+  EXPECT_EQ(read.couplings, model_.couplings);
+  ExpectSameSurface(read, model_);
+  EXPECT_EQ(read.shapes, model_.shapes);
+  EXPECT_TRUE(google::protobuf::util::MessageDifferencer::Equals(read.header, model_.header))
+      << read.header.DebugString();
 }
 
 TEST_F(NpzModel, WhatAResearcherLeavesOutIsMade) {
-  const auto read = ReadBack(Least());
-  ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_EQ(read->vertices, model_.vertices);
-  EXPECT_EQ(read->triangles, model_.triangles);
-  EXPECT_EQ(read->given_triangles, model_.triangles);
-  EXPECT_THAT(read->given_triangle, ElementsAre(0, 1, 2, 3));
-  EXPECT_EQ(read->couplings, model_.couplings);
-  EXPECT_EQ(read->header.complete_to_eigenvalue(), model_.eigenvalues.back());
-  EXPECT_DOUBLE_EQ(read->header.volume_m3(), 1.0 / 6);
-  EXPECT_EQ(read->header.settings().poisson_ratio(), 0.3);
+  const StoredModel read = ReadBack(Least()).value();
+  EXPECT_EQ(read.vertices, model_.vertices);
+  EXPECT_EQ(read.triangles, model_.triangles);
+  EXPECT_EQ(read.given_triangles, model_.triangles);
+  EXPECT_THAT(read.given_triangle, ElementsAre(0, 1, 2, 3));
+  EXPECT_EQ(read.couplings, model_.couplings);
+  EXPECT_EQ(read.header.complete_to_eigenvalue(), model_.eigenvalues.back());
+  EXPECT_DOUBLE_EQ(read.header.volume_m3(), 1.0 / 6);
+  EXPECT_EQ(read.header.settings().poisson_ratio(), 0.3);
 }
 
 TEST_F(NpzModel, AModelWithoutWhatItNeedsIsIncomplete) {

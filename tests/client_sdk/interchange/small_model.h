@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -38,6 +40,15 @@ inline StoredModel SmallModel() {
   static_cast<void>(Complete(coupled));
   model.couplings = coupled.couplings;
   return model;
+}
+
+/// The surfaces must be equal to the bit: the sounding one, and that which was given.
+inline void ExpectSameSurface(const StoredModel& one, const StoredModel& other) {
+  EXPECT_EQ(one.vertices, other.vertices);
+  EXPECT_EQ(one.triangles, other.triangles);
+  EXPECT_EQ(one.given_triangle, other.given_triangle);
+  EXPECT_EQ(one.given_vertices, other.given_vertices);
+  EXPECT_EQ(one.given_triangles, other.given_triangles);
 }
 
 /// A metal.

@@ -88,20 +88,6 @@ void Round(BodyPose& pose) {
     pose.orientation.coeffs()[i] = static_cast<float>(pose.orientation.coeffs()[i]);
 }
 
-MovingBody ToMoving(const falls::Body& body, double friction) {
-  MovingBody moving;
-  moving.name = body.name;
-  moving.surface = SurfaceOf(body);
-  moving.mass_kg = body.mass_kg;
-  moving.inertia_kg_m2 = ToVector(body.inertia_kg_m2).asDiagonal();
-  moving.friction = friction;
-  const auto& q = body.orientation;
-  BodyPose pose{ToVector(body.position_m), Turn(q[0], q[1], q[2], q[3]).normalized()};
-  Round(pose);
-  moving.poses.push_back(pose);
-  return moving;
-}
-
 /// The contacts of a simulation, step by step.
 class TruthReader {
  public:
@@ -195,13 +181,23 @@ double Quantile(std::vector<double> values, double share) {
   return values[static_cast<size_t>(std::lround(place))];
 }
 
-}  // namespace
-
+/// The surface of a body as a mesh.
 BodySurface SurfaceOf(const falls::Body& body) {
   if (const auto* ball = std::get_if<falls::Ball>(&body.shape)) return BallSurface(ball->radius_m);
   if (const auto* boxes = std::get_if<std::vector<falls::Box>>(&body.shape))
     return BoxSurface(*boxes);
   return BoxSurface({{.sides_m = {20, 20, 1}, .position_m = {0, 0, -0.5}}});
+}
+
+}  // namespace
+
+MovingBody ToMoving(const falls::Body& body) {
+  MovingBody moving;
+  moving.name = body.name;
+  moving.surface = SurfaceOf(body);
+  moving.mass_kg = body.mass_kg;
+  moving.inertia_kg_m2 = ToVector(body.inertia_kg_m2).asDiagonal();
+  return moving;
 }
 
 Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_frame, double step_s) {
@@ -212,8 +208,11 @@ Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_fra
   std::vector<BodyPose> poses;
   for (falls::Body& body : heard.bodies) {
     if (body.mass_kg > 0) body.model = "heard";
-    fall.motion.bodies.push_back(ToMoving(body, 1.2 * scene.friction));
-    poses.push_back(fall.motion.bodies.back().poses.front());
+    MovingBody& moving = fall.motion.bodies.emplace_back(ToMoving(body));
+    moving.friction = 1.2 * scene.friction;
+    const auto& q = body.orientation;
+    Round(poses.emplace_back(ToVector(body.position_m), Turn(q[0], q[1], q[2], q[3]).normalized()));
+    moving.poses.push_back(poses.back());
   }
   const falls::Simulation simulation = engine(heard, step_s);
   TruthReader truth(fall.motion);
@@ -309,18 +308,14 @@ Likeness Compare(const Fall& fall, const FoundContacts& contacts) {
   return likeness;
 }
 
-namespace {
-
-falls::Vector BoxInertia(double mass, const falls::Vector& s) {
-  return {mass * (s[1] * s[1] + s[2] * s[2]) / 12, mass * (s[0] * s[0] + s[2] * s[2]) / 12,
-          mass * (s[0] * s[0] + s[1] * s[1]) / 12};
-}
-
 falls::Body BoxBody(const std::string& name, const falls::Vector& sides, double mass) {
+  const auto moment = [&](size_t i, size_t k) {
+    return mass * (sides[i] * sides[i] + sides[k] * sides[k]) / 12;
+  };
   return {.name = name,
           .shape = std::vector<falls::Box>{{.sides_m = sides}},
           .mass_kg = mass,
-          .inertia_kg_m2 = BoxInertia(mass, sides),
+          .inertia_kg_m2 = {moment(1, 2), moment(0, 2), moment(0, 1)},
           .model = "",
           .material = ""};
 }
@@ -335,11 +330,9 @@ falls::Body BallBody(const std::string& name, double radius, double mass) {
           .material = ""};
 }
 
-falls::Body Floor() {
+falls::Body FloorBody() {
   return {.name = "floor", .shape = falls::Plane{}, .model = "", .material = ""};
 }
-
-}  // namespace
 
 /// An oak box of 12 x 9 x 6 cm that lands on two or three corners 15 to 60 ms apart.
 falls::FallScene CornerScene() {
@@ -347,14 +340,14 @@ falls::FallScene CornerScene() {
   box.position_m = {0, 0, 0.3};
   box.orientation = {0.84419, 0.3485584, -0.4056972, -0.03549596};
   box.velocity_m_per_s = {0.3, 0, 0};
-  return {.friction = 0.5, .restitution = 0.3, .seconds = 1.2, .bodies = {Floor(), box}};
+  return {.friction = 0.5, .restitution = 0.3, .seconds = 1.2, .bodies = {FloorBody(), box}};
 }
 
 falls::FallScene BounceScene() {
   falls::Body ball = BallBody("ball", 0.03, 0.1);
   ball.position_m = {0, 0, 0.4};
   ball.velocity_m_per_s = {0.5, 0.1, 0};
-  return {.friction = 0.5, .restitution = 0.6, .seconds = 1.8, .bodies = {Floor(), ball}};
+  return {.friction = 0.5, .restitution = 0.6, .seconds = 1.8, .bodies = {FloorBody(), ball}};
 }
 
 falls::FallScene AirScene() {
@@ -366,14 +359,15 @@ falls::FallScene AirScene() {
   two.position_m = {0.2, 0.02, 2.01};
   two.velocity_m_per_s = {-1, 0, 0};
   two.angular_velocity_rad_per_s = {-1, 4, 1};
-  return {.friction = 0.5, .restitution = 0.3, .seconds = 0.5, .bodies = {Floor(), one, two}};
+  return {.friction = 0.5, .restitution = 0.3, .seconds = 0.5, .bodies = {FloorBody(), one, two}};
 }
 
 /// Six hollow blocks of wood in a pile, and a ball that rolls into them (scene_makers.py).
 falls::FallScene BlocksScene() {
   constexpr double kSide = 0.05;
   const double mass = 550 * std::pow(kSide, 3) * (1 - std::pow(0.9, 3)), radius = 0.6 * kSide;
-  falls::FallScene scene{.friction = 0.5, .restitution = 0, .seconds = 2.5, .bodies = {Floor()}};
+  falls::FallScene scene{
+      .friction = 0.5, .restitution = 0, .seconds = 2.5, .bodies = {FloorBody()}};
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3 - row; ++column) {
       falls::Body block =

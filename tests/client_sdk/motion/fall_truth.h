@@ -45,13 +45,18 @@ struct Likeness {
 };
 Likeness Compare(const Fall& fall, const FoundContacts& contacts);
 
+/// Bodies without a model or a material, which rest at the origin.
+falls::Body BoxBody(const std::string& name, const falls::Vector& sides_m, double mass_kg);
+falls::Body BallBody(const std::string& name, double radius_m, double mass_kg);
+falls::Body FloorBody();
+
+/// The surface, the mass and the moments of a body, without poses.
+MovingBody ToMoving(const falls::Body& body);
+
 /// The scenes of the tests and of the benchmark.
 falls::FallScene CornerScene();
 falls::FallScene BounceScene();
 falls::FallScene AirScene();
 falls::FallScene BlocksScene();
-
-/// The surface of a body as a mesh.
-BodySurface SurfaceOf(const falls::Body& body);
 
 }  // namespace carillon::motion

@@ -75,13 +75,12 @@ TEST(TakeEach, LeavesFewFalseImpactsOfNoisyPoses) {
       const Likeness before = Compare(fall, *FindContacts(fall.motion, true));
       const PoseNoise noise = MeasureNoise(fall.motion);
       TakeEach(noise.frames_apart, fall.motion);
-      const auto found = FindContacts(fall.motion);
-      ASSERT_TRUE(found.ok()) << found.status();
-      const Likeness after = Compare(fall, *found);
+      const FoundContacts found = FindContacts(fall.motion).value();
+      const Likeness after = Compare(fall, found);
       EXPECT_GE(after.found_share, 0.9) << rate;
       EXPECT_LT(after.false_share, 0.1) << rate;
       EXPECT_LE(after.false_share, before.false_share) << rate;
-      EXPECT_LT(found->confidence.unexplained, 0.01) << rate;
+      EXPECT_LT(found.confidence.unexplained, 0.01) << rate;
     }
   }
 }
