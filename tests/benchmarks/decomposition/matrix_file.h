@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <sys/resource.h>
-
 #include <Eigen/SparseCore>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "tests/benchmarks/stopwatch.h"
 
 namespace carillon {
 
@@ -52,28 +51,6 @@ inline Eigen::SparseMatrix<double> ReadSparse(const std::string& path) {
   return Eigen::Map<const Eigen::SparseMatrix<double>>(
       size, size, static_cast<Eigen::Index>(value.size()), start.data(), row.data(), value.data());
 }
-
-/// Time of this process since it was made, as a line of JSON for run.py.
-class Stopwatch {
- public:
-  double CpuSeconds() const { return Cpu() - cpu_; }
-  double Seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
-  }
-
- private:
-  static double Cpu() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& t) {
-      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-    };
-    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-  }
-
-  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
-  double cpu_ = Cpu();
-};
 
 /// Writes eigenvalues and shapes (column-major) into `folder` and prints the times, and `more`,
 /// which is empty or further members of the JSON object with a comma before each.

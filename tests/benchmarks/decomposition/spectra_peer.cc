@@ -44,28 +44,20 @@ class FactorizedInverse {
   Eigen::SimplicialLDLT<Sparse> factorization_;
 };
 
-struct Task {
-  std::string folder;
-  int count;
-  double shift;
-  double tolerance;
-};
-
-int Solve(const Task& task) {
-  const Sparse K = ReadSparse(task.folder + "/K");
-  const Sparse M = ReadSparse(task.folder + "/M");
+int Solve(const std::string& folder, int count, double shift, double tolerance) {
+  const Sparse K = ReadSparse(folder + "/K");
+  const Sparse M = ReadSparse(folder + "/M");
   const Stopwatch watch;
   FactorizedInverse inverse(K, M);
   MassProduct mass(M);
   Spectra::SymGEigsShiftSolver<FactorizedInverse, MassProduct, Spectra::GEigsMode::ShiftInvert>
-      solver(inverse, mass, task.count, 2 * task.count + 20, task.shift);
+      solver(inverse, mass, count, 2 * count + 20, shift);
   solver.init();
-  solver.compute(Spectra::SortRule::LargestMagn, 1000, task.tolerance,
-                 Spectra::SortRule::SmallestAlge);
+  solver.compute(Spectra::SortRule::LargestMagn, 1000, tolerance, Spectra::SortRule::SmallestAlge);
   if (solver.info() != Spectra::CompInfo::Successful) return EXIT_FAILURE;
   const Eigen::VectorXd eigenvalues = solver.eigenvalues();
   const Eigen::MatrixXd shapes = solver.eigenvectors();
-  Report(watch, task.folder, eigenvalues, shapes);
+  Report(watch, folder, eigenvalues, shapes);
   return EXIT_SUCCESS;
 }
 
@@ -77,10 +69,7 @@ int main(int argc, char** argv) try {
     std::fputs("usage: spectra_peer FOLDER COUNT SHIFT TOLERANCE\n", stderr);
     return EXIT_FAILURE;
   }
-  return carillon::Solve({.folder = argv[1],
-                          .count = std::atoi(argv[2]),
-                          .shift = std::atof(argv[3]),
-                          .tolerance = std::atof(argv[4])});
+  return carillon::Solve(argv[1], std::atoi(argv[2]), std::atof(argv[3]), std::atof(argv[4]));
 } catch (const std::exception& error) {
   std::fprintf(stderr, "spectra_peer: %s\n", error.what());
   return EXIT_FAILURE;

@@ -105,12 +105,14 @@ class Studio:
 
     def strikes(self, name, truth, span, noise_db, room, random, keep=None):
         """Files with blows on a body."""
+        import carillon
+
         hz = truth.frequencies_hz() * (1 + JITTER * random.standard_normal(len(truth.eigenvalues)))
         files = []
         for strike in range(STRIKES):
             sound = struck.strike(truth, hz, random.uniform(*span), noise_db, room, random, keep)
             files.append(self.folder / f"{name}-{strike}.wav")
-            struck.write_wave(files[-1], sound)
+            carillon.Sound(sound[:, None], struck.RATE_HZ).save(files[-1])
         return files
 
 

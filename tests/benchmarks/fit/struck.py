@@ -3,7 +3,6 @@
 
 import dataclasses
 import math
-import wave
 
 import bodies
 import numpy
@@ -148,11 +147,3 @@ def strike(truth, frequencies, duration_s, noise_db, room, random, keep=None):
     noise = pink_noise(len(sound), random)
     sound += noise * level * 10 ** (-noise_db / 20) / numpy.sqrt(numpy.mean(noise**2))
     return 0.9 * sound / numpy.max(numpy.abs(sound))
-
-
-def write_wave(path, sound):
-    """A WAV file of 24 bits."""
-    with wave.open(str(path), "wb") as file:
-        file.setparams((1, 3, RATE_HZ, len(sound), "NONE", ""))
-        numbers = numpy.round(sound * (2**23 - 1)).astype("<i4")
-        file.writeframes(numbers.view(numpy.uint8).reshape(-1, 4)[:, :3].tobytes())

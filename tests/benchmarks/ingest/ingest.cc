@@ -7,20 +7,17 @@
 // columns that strike a new point with each impulse.
 
 #include <carillon/client.h>
-#include <sys/resource.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdlib>
 #include <iostream>
-#include <memory>
 #include <string>
 #include <thread>
 
-namespace {
+#include "tests/benchmarks/stopwatch.h"
 
-using std::chrono::steady_clock;
+namespace {
 
 constexpr uint32_t kObjectCount = 16;
 constexpr std::array<float, 3> kPointM = {0, 0.008F, 0.01F};
@@ -71,32 +68,17 @@ carillon::v1::ContactStep MakeStep(double time_s, const Options& options) {
 }
 
 void SendAll(const Options& options, carillon::client::ContactStream& stream) {
-  const steady_clock::time_point begin = steady_clock::now();
-  const auto elapsed_s = [begin] {
-    return std::chrono::duration<double>(steady_clock::now() - begin).count();
-  };
-  for (uint64_t number = 0; elapsed_s() < options.seconds; ++number) {
+  const carillon::Stopwatch watch;
+  for (uint64_t number = 0; watch.Seconds() < options.seconds; ++number) {
     if (options.messages_per_second > 0) {
-      const std::chrono::duration<double> due(static_cast<double>(number) /
-                                              options.messages_per_second);
-      std::this_thread::sleep_until(begin +
-                                    std::chrono::duration_cast<steady_clock::duration>(due));
+      const double due_s = static_cast<double>(number) / options.messages_per_second;
+      std::this_thread::sleep_for(std::chrono::duration<double>(due_s - watch.Seconds()));
     }
     while (stream.WaitingStepCount() >= kMostWaiting) {
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
-    if (!stream.Send(MakeStep(elapsed_s(), options)).ok()) return;
+    if (!stream.Send(MakeStep(watch.Seconds(), options)).ok()) return;
   }
-}
-
-double Seconds(const timeval& time) {
-  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-}
-
-double CpuS() {
-  rusage used{};
-  getrusage(RUSAGE_SELF, &used);
-  return Seconds(used.ru_utime) + Seconds(used.ru_stime);
 }
 
 int Run(const std::string& server, const carillon::v1::ContactStreamStart& start,
@@ -104,13 +86,11 @@ int Run(const std::string& server, const carillon::v1::ContactStreamStart& start
   const auto client = carillon::client::Connect(server);
   auto stream = client->StreamContacts(start);
   if (!stream.ok()) return 1;
-  const double cpu_before_s = CpuS();
-  const steady_clock::time_point begin = steady_clock::now();
+  const carillon::Stopwatch watch;
   SendAll(options, **stream);
   const auto report = (*stream)->Finish();
   if (!report.ok()) return 1;
-  const std::chrono::duration<double> seconds = steady_clock::now() - begin;
-  std::cout << "{\"seconds\": " << seconds.count() << ", \"cpu_s\": " << CpuS() - cpu_before_s
+  std::cout << "{\"seconds\": " << watch.Seconds() << ", \"cpu_s\": " << watch.CpuSeconds()
             << ", \"accepted\": " << report->accepted_count()
             << ", \"late\": " << report->late_count()
             << ", \"dropped\": " << report->dropped_count()

@@ -55,8 +55,8 @@ Directivity DrawDirectivity(const SoundingModes& sounding, uint32_t most_order) 
 
 /// What is measured.
 struct PlacedSetting {
-  const char* name = "";
-  bool placed = false;
+  std::string name;
+  bool placed = true;
   bool moving = false;
   uint32_t most_order = 0;  ///< zero: without directivity
   bool near_field = false;
@@ -157,7 +157,7 @@ void MeasurePlaced(const PlacedSetting& setting, size_t object_count, uint32_t m
   std::printf(
       "{\"what\": \"%s\", \"target\": \"%s\", \"objects\": %zu, \"modes\": %u, "
       "\"harmonics\": %zu, \"load\": %.5f, \"p99_block_ms\": %.4f}\n",
-      setting.name, std::string(SimdTarget()).c_str(), object_count, mode_count,
+      setting.name.c_str(), std::string(SimdTarget()).c_str(), object_count, mode_count,
       stage.harmonic_count(), Quantile(block_s, 0.5) / kPlacedBlockS,
       1e3 * Quantile(block_s, 0.99));
   std::fflush(stdout);
@@ -167,34 +167,24 @@ void MeasurePlaced(const PlacedSetting& setting, size_t object_count, uint32_t m
 
 int MeasureDirected(const Arguments& arguments) {
   const double seconds = arguments.empty() ? 10 : std::atof(arguments[0].c_str());
-  constexpr uint32_t kFew = 2, kMany = 36;
-  const PlacedSetting settings[] = {
-      {.name = "no place"},
-      {.name = "place", .placed = true},
-      {.name = "place, moving", .placed = true, .moving = true},
-      {.name = "two ears", .placed = true, .binaural = true},
-      {.name = "two ears, moving", .placed = true, .moving = true, .binaural = true},
-      {.name = "directions of order 2", .placed = true, .most_order = kFew},
-      {.name = "directions of order 2, moving", .placed = true, .moving = true, .most_order = kFew},
-      {.name = "directions of order 2, near, moving",
-       .placed = true,
-       .moving = true,
-       .most_order = kFew,
-       .near_field = true},
-      {.name = "directions to order 29", .placed = true, .most_order = kMany},
-      {.name = "directions to order 29, moving",
-       .placed = true,
-       .moving = true,
-       .most_order = kMany},
-      {.name = "directions to order 29, near, moving",
-       .placed = true,
-       .moving = true,
-       .most_order = kMany,
-       .near_field = true},
-  };
-  for (const PlacedSetting& setting : settings) {
+  const auto measure = [seconds](const PlacedSetting& setting) {
     MeasurePlaced(setting, 1, 800, 4 * seconds);
     MeasurePlaced(setting, 20, 200, seconds);
+  };
+  measure({.name = "no place", .placed = false});
+  for (PlacedSetting setting : {PlacedSetting{.name = "place"},
+                                {.name = "two ears", .binaural = true},
+                                {.name = "directions of order 2", .most_order = 2},
+                                {.name = "directions to order 29", .most_order = 36}}) {
+    const std::string name = setting.name;
+    measure(setting);
+    setting.moving = true;
+    setting.name = name + ", moving";
+    measure(setting);
+    if (setting.most_order == 0) continue;
+    setting.near_field = true;
+    setting.name = name + ", near, moving";
+    measure(setting);
   }
   return EXIT_SUCCESS;
 }

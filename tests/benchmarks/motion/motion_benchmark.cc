@@ -2,22 +2,19 @@
 //
 // Lets bodies fall in an engine at 2400 Hz, finds their contacts from the poses of frames alone,
 // and prints how these compare with the engine's: a line for each scene and frame rate.
-#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "client_sdk/motion/find_contacts.h"
+#include "tests/benchmarks/stopwatch.h"
 #include "tests/client_sdk/motion/fall_truth.h"
 
 namespace carillon::motion {
 namespace {
-
-double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 #ifdef CARILLON_MUJOCO
 /// MuJoCo leaves the poses from before its step. Gives those after it, as the other engines do.
@@ -45,11 +42,9 @@ void PrintRow(const std::string& name, const falls::FallScene& scene, const Engi
   const double step_s = name == "crowd" ? 1.0 / 240 : 1.0 / 2400;
   const Fall fall =
       Drop(scene, engine, static_cast<int>(std::lround(1 / step_s)) / frames_per_second, step_s);
-  const double begin = CpuSeconds();
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const auto found = FindContacts(fall.motion);
-  const double cpu_s = CpuSeconds() - begin;
-  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  const double cpu_s = watch.CpuSeconds(), wall_s = watch.Seconds();
   std::printf("%s\t%d\t", name.c_str(), frames_per_second);
   if (!found.ok()) {
     std::printf("%s\n", std::string(found.status().message()).c_str());
@@ -62,7 +57,7 @@ void PrintRow(const std::string& name, const falls::FallScene& scene, const Engi
       1e3 * is.median_dt_s, 1e3 * is.dt90_s, 100 * is.median_size_error,
       100 * is.median_vector_error, 1e3 * is.median_point_m, 100 * found->confidence.unexplained,
       100 * found->confidence.ambiguity);
-  std::printf("%.2f, %.2f\n", cpu_s, wall.count());
+  std::printf("%.2f, %.2f\n", cpu_s, wall_s);
   std::fflush(stdout);
 }
 

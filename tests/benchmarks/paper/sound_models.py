@@ -4,7 +4,6 @@
 import dataclasses
 import math
 import pathlib
-import wave
 
 import bench
 import catalogue
@@ -79,16 +78,6 @@ def levels(sound):
     return numpy.abs(sound).max(), exposure, middle, (last + 1) / 100
 
 
-def save(path, sound):
-    """As a WAV file of 16 bits whose peak is 0.9 of full scale."""
-    words = numpy.rint(.9 * 32767 / numpy.abs(sound).max() * sound).astype("<i2")
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(RATE_HZ)
-        file.writeframes(words.tobytes())
-
-
 def draw(made, path):
     """A spectrogram of the first and the last variant of each body, on one scale of sound pressure level."""
     pyplot = bench.pyplot()
@@ -113,6 +102,7 @@ def draw(made, path):
 
 def compare(solver, rows, picture, folder):
     """Draws the picture and leaves each sound in the folder. Returns the lines of the table."""
+    import carillon
     lines = bench.head("body", "sound model", "peak at 1 m, Pa", "exposure level, dB", "half of the energy below, Hz",
                  "40 dB below after, s")
     pathlib.Path(folder).mkdir(parents=True, exist_ok=True)
@@ -123,6 +113,7 @@ def compare(solver, rows, picture, folder):
             peak, exposure, middle, lasts = levels(sound)
             lines.append(bench.row(case.title, name, f"{peak:.3g}", f"{exposure:.1f}", f"{middle:.0f}", f"{lasts:.2f}"))
         for name, word in ((PAPER, "paper"), (OURS, "carillon")):
-            save(pathlib.Path(folder) / f"{case.title}_{word}.wav", made[case.title][name])
+            loud = carillon.Sound(made[case.title][name][:, None], RATE_HZ).normalized(0.9)
+            loud.save(pathlib.Path(folder) / f"{case.title}_{word}.wav")
     draw(made, picture)
     return lines
