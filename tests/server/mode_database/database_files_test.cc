@@ -4,51 +4,28 @@
 
 #include "server/mode_database/database_files.h"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <chrono>
-#include <fstream>
 #include <functional>
+#include <future>
 #include <set>
-#include <string>
 #include <thread>
-#include <utility>
-#include <vector>
 
+#include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
-#include "server/base/sha256.h"
 #include "server/mode_database/database.h"
 #include "server/mode_database/maintenance/database_admin.h"
 #include "server/mode_database/maintenance/database_keeper.h"
-#include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 
 namespace carillon {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class DatabaseFilesTest : public ::testing::Test {
+class DatabaseFilesTest : public DatabaseTest {
  protected:
-  DatabaseFilesTest() {
-    WriteRecords(folder_ / "model", SampleRecords(SampleModel(20, 100)));
-    Open();
-    EXPECT_TRUE(Put("kept").ok());
-  }
-
-  void Open() {
-    database_.reset();
-    database_ = *ModeDatabase::Open(file_, clock_);
-  }
-
-  absl::Status Put(const std::string& name) {
-    return database_->models().PutFile(Sha256Hex(name), name, folder_ / "model").status();
-  }
-
-  bool Has(const std::string& name) { return database_->models().Find(Sha256Hex(name)).ok(); }
+  DatabaseFilesTest() { EXPECT_TRUE(Put("kept").ok()); }
 
   /// After `harm` nothing is acknowledged any more, and nothing new appears in the file's place.
   void ExpectLost(const std::function<void()>& harm) {
@@ -60,11 +37,7 @@ class DatabaseFilesTest : public ::testing::Test {
     EXPECT_FALSE(database_->database().CheckState().ok());
   }
 
-  TemporaryFolder folder_;
-  const std::filesystem::path file_ = folder_ / "carillon.db";
   const std::filesystem::path log_ = folder_ / "carillon.db-wal";
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
 };
 
 TEST_F(DatabaseFilesTest, AfterTheFileWasReplacedNothingIsAcknowledged) {
@@ -165,9 +138,10 @@ TEST_F(DatabaseFilesTest, TheLogStaysSmallHoweverMuchIsWritten) {
 }
 
 TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
-  WriteRecords(folder_ / "model", SampleRecords(SampleModel(200, 5000)));
-  for (int i = 0; i < 8; ++i) ASSERT_TRUE(Put(std::to_string(i)).ok());
-  Open();
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(Put(std::to_string(i), SampleModel(200, 5000)).ok());
+  }
+  Reopen();
   const uintmax_t before = std::filesystem::file_size(file_);
   for (int i = 0; i < 8; ++i) {
     ASSERT_TRUE(database_->models().Delete(Sha256Hex(std::to_string(i))).ok());
@@ -176,7 +150,7 @@ TEST_F(DatabaseFilesTest, TheFileShrinksAfterDeletions) {
   EXPECT_LT(std::filesystem::file_size(file_), before / 2);
   EXPECT_TRUE(Has("kept"));
   EXPECT_TRUE(Put("new").ok());
-  Open();
+  Reopen();
   EXPECT_TRUE(Has("new"));
 }
 
@@ -205,7 +179,7 @@ TEST_F(DatabaseFilesTest, UnfinishedCopiesAreRemovedAtTheStartAndNothingElse) {
       folder_ / "carillon.db-unfinished-work"};
   for (const auto& path : unfinished) std::ofstream(path) << "x";
   for (const auto& path : others) std::ofstream(path) << "x";
-  Open();
+  Reopen();
   for (const auto& path : unfinished) EXPECT_FALSE(std::filesystem::exists(path)) << path;
   for (const auto& path : others) EXPECT_TRUE(std::filesystem::exists(path)) << path;
 }
@@ -224,15 +198,53 @@ TEST_F(DatabaseFilesTest, ADatabaseMayLieWhereALinkLeads) {
   ExpectLost([&] { std::filesystem::remove(disk / "real.db"); });
 }
 
-TEST_F(DatabaseFilesTest, TheKeeperTellsWhenTheFilesAreLost) {
-  std::vector<bool> good;
-  DatabaseKeeper keeper(database_->database(),
-                        [&good](const absl::Status& files) { good.push_back(files.ok()); });
+/// Another process holds the database for writing.
+class HeldDatabaseTest : public DatabaseFilesTest {
+ protected:
+  HeldDatabaseTest() { EXPECT_TRUE(other_->Run("BEGIN IMMEDIATE").ok()); }
+
+  const std::unique_ptr<SqliteConnection> other_ = *SqliteConnection::Open(file_);
+};
+
+TEST_F(HeldDatabaseTest, ChangesThatWaitTogetherGiveUpTogether) {
+  std::vector<std::future<absl::Status>> changes;
+  for (const char* name : {"a", "b", "c"}) {
+    changes.push_back(std::async(std::launch::async, [this, name] { return Put(name); }));
+  }
+  // A change that waited for the one before and then 10 s more would find the database free.
+  std::this_thread::sleep_for(std::chrono::seconds(15));
+  ASSERT_TRUE(other_->Run("ROLLBACK").ok());
+  for (auto& change : changes) {
+    EXPECT_THAT(change.get().ToString(), HasSubstr("DATABASE_BUSY: "));
+  }
+  EXPECT_TRUE(Put("a").ok());
+}
+
+TEST_F(HeldDatabaseTest, TheKeeperTellsUntilTheDatabaseCanBeChangedAgain) {
+  std::vector<std::string> told;
+  DatabaseKeeper keeper(database_->database(), [&told](const absl::Status& state) {
+    told.push_back(state.ok() ? "OK" : ToErrorInfo(state).reason());
+  });
+  keeper.Look();
+  EXPECT_FALSE(Put("a").ok());
   for (int i = 0; i < 3; ++i) keeper.Look();
-  EXPECT_THAT(good, testing::ElementsAre(true));
-  std::filesystem::remove(file_);
+  EXPECT_THAT(told, ElementsAre("OK", "DATABASE_BUSY"));
+  EXPECT_FALSE(database_->database().CheckState().ok());
+  ASSERT_TRUE(other_->Run("ROLLBACK").ok());
   for (int i = 0; i < 3; ++i) keeper.Look();
-  EXPECT_THAT(good, testing::ElementsAre(true, false));
+  EXPECT_THAT(told, ElementsAre("OK", "DATABASE_BUSY", "OK"));
+  EXPECT_TRUE(database_->database().CheckState().ok());
+}
+
+TEST_F(HeldDatabaseTest, ModelsAreFoundWhileACollectionWaits) {
+  auto collected =
+      std::async(std::launch::async, [this] { return database_->models().Collect(0); });
+  // The collection has begun to wait, which it does for 10 s.
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_TRUE(database_->models().FindToSound(Sha256Hex("kept")).ok());
+  EXPECT_EQ(collected.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  ASSERT_TRUE(other_->Run("ROLLBACK").ok());
+  EXPECT_EQ(collected.get()->model_count, 1U);
 }
 
 }  // namespace

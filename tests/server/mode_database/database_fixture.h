@@ -24,16 +24,24 @@ class DatabaseTest : public ::testing::Test {
 
   void Reopen() {
     database_.reset();
-    auto opened = ModeDatabase::Open(file_, clock_);
-    ASSERT_TRUE(opened.ok()) << opened.status();
-    database_ = *std::move(opened);
+    database_ = *ModeDatabase::Open(file_, clock_);
   }
 
   absl::Status PutModel(const std::string& digest, const ModalModel& model,
                         const std::string& label = "") {
-    WriteRecords(folder_ / "model", SampleRecords(model));
-    return database_->models().PutFile(digest, label, folder_ / "model").status();
+    const std::filesystem::path file = folder_ / ("model " + digest);
+    WriteRecords(file, SampleRecords(model));
+    absl::Status status = database_->models().PutFile(digest, label, file).status();
+    std::filesystem::remove(file);
+    return status;
   }
+
+  /// Stores a model under the digest of a name.
+  absl::Status Put(const std::string& name, const ModalModel& model = SampleModel(20, 100)) {
+    return PutModel(Sha256Hex(name), model, name);
+  }
+
+  bool Has(const std::string& name) { return database_->models().Find(Sha256Hex(name)).ok(); }
 
   /// Flips one bit of the database file, in the first place that holds `bytes`.
   void FlipABitWithin(std::string_view bytes) {

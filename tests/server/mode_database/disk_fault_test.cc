@@ -1,46 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The disk fails at every access there is, one after the other.
+// The disk fails at every access there is, one after the other, or holds an access while others go
+// on.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
+#include <atomic>
 #include <chrono>
 #include <functional>
-#include <memory>
-#include <string>
+#include <future>
 
-#include "server/base/sha256.h"
 #include "server/mode_database/database.h"
-#include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
+#include "tests/server/mode_database/database_fixture.h"
 #include "tests/server/mode_database/faulty_vfs.h"
-#include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
 namespace {
 
 using ::testing::HasSubstr;
 
-class DiskFaultTest : public ::testing::TestWithParam<DiskFault> {
+class DiskFaultTest : public DatabaseTest, public ::testing::WithParamInterface<DiskFault> {
  protected:
   DiskFaultTest() {
-    EXPECT_TRUE(Open().ok());
-    WriteRecords(folder_ / "model", SampleRecords(SampleModel(20, 100)));
+    Reopen();  // on the disk that fails
     EXPECT_TRUE(Put("kept").ok());
   }
-
-  absl::Status Open() {
-    database_.reset();
-    auto opened = ModeDatabase::Open(file_, clock_);
-    absl::Status status = opened.status();
-    if (status.ok()) database_ = *std::move(opened);
-    return status;
-  }
-
-  absl::Status Put(const std::string& name) {
-    return database_->models().PutFile(Sha256Hex(name), name, folder_ / "model").status();
-  }
+  void TearDown() override { database_.reset(); }  // before its disk
 
   static bool SaysWhatTheDiskDid(const absl::Status& status) {
     const std::string text = status.ToString();
@@ -73,30 +57,25 @@ class DiskFaultTest : public ::testing::TestWithParam<DiskFault> {
         EXPECT_TRUE(SaysWhatTheDiskDid(status)) << "access " << good_count << ": " << status;
       }
       EXPECT_EQ(IntegrityCheck(), "ok") << "access " << good_count;
-      EXPECT_TRUE(database_->models().Find(Sha256Hex("kept")).ok()) << "access " << good_count;
+      EXPECT_TRUE(Has("kept")) << "access " << good_count;
       if (!failed || HasFailure()) return good_count;
     }
   }
 
-  TemporaryFolder folder_;
-  const std::filesystem::path file_ = folder_ / "carillon.db";
   const FaultyDisk disk_;
-  SystemClock clock_;
-  std::unique_ptr<ModeDatabase> database_;
 };
 
 TEST_P(DiskFaultTest, WhatCannotBeStoredIsAnErrorAndTheDatabaseStaysWhole) {
-  const auto is_there = [&] { return database_->models().Find(Sha256Hex("new")).status(); };
   int64_t failures = FailAtEveryAccess([&] {
     const absl::Status status = Put("new");
     const bool told = FaultyDisk::Repair();
     // An error means that nothing is there, success that all is.
-    EXPECT_EQ(status.ok(), is_there().ok()) << status;
+    EXPECT_EQ(status.ok(), Has("new")) << status;
     const absl::Status removed = database_->models().Delete(Sha256Hex("new"));
     EXPECT_EQ(removed.ok(), status.ok()) << removed;
     return told ? status : absl::OkStatus();
   });
-  EXPECT_GE(failures, 0);
+  EXPECT_GT(failures, 0);
 }
 
 TEST_P(DiskFaultTest, EveryWriteOfEveryCallMayFail) {
@@ -117,37 +96,29 @@ TEST_P(DiskFaultTest, EveryWriteOfEveryCallMayFail) {
   EXPECT_GT(failures, 20);
 }
 
-std::string NameOf(const ::testing::TestParamInfo<DiskFault>& fault) {
-  switch (fault.param) {
-    case DiskFault::kFull:
-      return "Full";
-    case DiskFault::kReadOnly:
-      return "ReadOnly";
-    default:
-      return "WriteError";
-  }
-}
-
 INSTANTIATE_TEST_SUITE_P(Disk, DiskFaultTest,
                          ::testing::Values(DiskFault::kFull, DiskFault::kReadOnly,
                                            DiskFault::kWriteError),
-                         NameOf);
+                         [](const auto& fault) {
+                           return std::string(fault.param == DiskFault::kFull       ? "Full"
+                                              : fault.param == DiskFault::kReadOnly ? "ReadOnly"
+                                                                                    : "WriteError");
+                         });
 
 class ReadErrorTest : public DiskFaultTest {};
 
 TEST_P(ReadErrorTest, AModelThatCannotBeReadNowIsNotTakenForDamaged) {
   int quarantined = 0;
-  database_->models().ListenToQuarantine([&](const auto&, const auto&) { ++quarantined; });
-  ASSERT_TRUE(Open().ok());  // nothing of it in SQLite's own cache
   for (int64_t good_count = 0;; ++good_count) {
-    ASSERT_TRUE(Open().ok());
+    Reopen();  // nothing of it in SQLite's own cache
+    database_->models().ListenToQuarantine([&](const auto&, const auto&) { ++quarantined; });
     FaultyDisk::FailAfter(good_count, GetParam());
     const absl::Status status = database_->models().Find(Sha256Hex("kept")).status();
     if (!FaultyDisk::Repair()) break;
     EXPECT_THAT(status.ToString(), HasSubstr("DATABASE_IO_ERROR"));
   }
   EXPECT_EQ(quarantined, 0);
-  EXPECT_TRUE(database_->models().Find(Sha256Hex("kept")).ok());
+  EXPECT_TRUE(Has("kept"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Disk, ReadErrorTest, ::testing::Values(DiskFault::kReadError));
@@ -172,6 +143,103 @@ TEST(TemporaryFolder, NeedsNoSpaceForAnyChange) {
   EXPECT_EQ(models.Collect(0).status(), absl::OkStatus());
   EXPECT_EQ(database->meshes().Collect(std::chrono::milliseconds(-1)).status(), absl::OkStatus());
   EXPECT_EQ(database->database().Tidy(), absl::OkStatus());
+}
+
+// Only a call that waits for another takes this long.
+constexpr std::chrono::seconds kDeadline(20);
+
+/// Who waits while a model is read, and while its quarantine is told.
+class ModelLoadingTest : public DatabaseTest {
+ protected:
+  ModelLoadingTest() {
+    EXPECT_TRUE(PutModel(a_, model_).ok() && PutModel(b_, model_).ok());
+    Reopen();  // on the disk that fails, and with nothing of them in SQLite's own cache
+  }
+  void TearDown() override { database_.reset(); }  // before its disk
+
+  /// Changes a byte of the mode shapes of both models on the disk.
+  void Damage() {
+    database_.reset();
+    std::string content = ReadBytes(file_);
+    const std::string shapes(reinterpret_cast<const char*>(model_.shapes.data()), 64);
+    size_t count = 0;
+    for (size_t at = content.find(shapes); at != std::string::npos; at = content.find(shapes, at)) {
+      content[at] ^= 1;
+      ++count;
+    }
+    ASSERT_EQ(count, 2U);
+    WriteBytes(file_, content);
+    Reopen();
+  }
+
+  const ModalModel model_ = SampleModel(20, 100);
+  const FaultyDisk disk_;
+};
+
+TEST_F(ModelLoadingTest, AModelThatIsBeingReadKeepsOnlyItsOwnReadersWaiting) {
+  ModelStore& models = database_->models();
+  std::future<bool> slow = std::async(std::launch::async, [&] {
+    FaultyDisk::HoldReadsOfThisThread();
+    return models.FindToSound(a_).ok();
+  });
+  ASSERT_TRUE(FaultyDisk::AwaitHeldRead());
+  std::future<bool> same = std::async(std::launch::async, [&] { return models.Find(a_).ok(); });
+  std::future<bool> others = std::async(std::launch::async, [&] {
+    const bool found =
+        models.Summary(a_).ok() && models.List({}, 0, "").ok() && models.FindToSound(b_).ok();
+    return found && models.Collect(0)->model_count == 1;
+  });
+  EXPECT_EQ(others.wait_for(kDeadline), std::future_status::ready);
+  EXPECT_EQ(same.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  FaultyDisk::ReleaseReads();
+  EXPECT_TRUE(others.get());
+  EXPECT_TRUE(same.get());
+  EXPECT_TRUE(slow.get());
+  // The collection has spared the model that was being read.
+  EXPECT_TRUE(models.Summary(a_).ok());
+  EXPECT_TRUE(absl::IsNotFound(models.Summary(b_).status()));
+}
+
+TEST_F(ModelLoadingTest, AModelIsSharedByAllWhoLoadItAtTheSameTime) {
+  std::vector<std::future<std::shared_ptr<const ModalModel>>> loads;
+  loads.reserve(4);
+  for (int i = 0; i < 4; ++i) {
+    loads.push_back(std::async(std::launch::async, [&] { return *database_->models().Find(a_); }));
+  }
+  const std::shared_ptr<const ModalModel> first = loads[0].get();
+  for (int i = 1; i < 4; ++i) EXPECT_EQ(loads[i].get(), first);
+}
+
+TEST_F(ModelLoadingTest, EigenvaluesAreReadWithoutTheRest) {
+  EXPECT_EQ(*database_->models().Eigenvalues(a_), model_.eigenvalues);
+  Damage();
+  EXPECT_EQ(*database_->models().Eigenvalues(a_), model_.eigenvalues);
+  EXPECT_TRUE(absl::IsDataLoss(database_->models().Find(a_).status()));
+  EXPECT_TRUE(absl::IsDataLoss(database_->models().Eigenvalues(a_).status()));
+}
+
+TEST_F(ModelLoadingTest, AListenerThatIsReplacedHasEnded) {
+  Damage();
+  std::promise<void> begun;
+  std::promise<void> gate;
+  std::atomic<bool> ended = false;
+  database_->models().ListenToQuarantine([&](const std::string&, const absl::Status&) {
+    begun.set_value();
+    gate.get_future().wait();
+    ended = true;
+  });
+  std::future<bool> find =
+      std::async(std::launch::async, [&] { return database_->models().Find(a_).ok(); });
+  begun.get_future().wait();
+  std::future<bool> replace = std::async(std::launch::async, [&] {
+    database_->models().ListenToQuarantine(nullptr);
+    return ended.load();
+  });
+  EXPECT_EQ(replace.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  gate.set_value();
+  EXPECT_TRUE(replace.get());
+  EXPECT_FALSE(find.get());
+  EXPECT_FALSE(database_->models().Find(b_).ok());
 }
 
 }  // namespace

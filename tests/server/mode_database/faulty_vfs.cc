@@ -183,6 +183,4 @@ bool FaultyDisk::AwaitHeldRead() { return read_latch.AwaitHeld(); }
 
 void FaultyDisk::ReleaseReads() { read_latch.Release(); }
 
-void LimitDatabaseMemory(int64_t byte_count) { sqlite3_hard_heap_limit64(byte_count); }
-
 }  // namespace carillon

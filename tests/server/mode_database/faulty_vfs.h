@@ -49,7 +49,4 @@ class FaultyDisk {
   static void ReleaseReads();
 };
 
-/// Lets SQLite have only so much memory; zero removes the limit.
-void LimitDatabaseMemory(int64_t byte_count);
-
 }  // namespace carillon

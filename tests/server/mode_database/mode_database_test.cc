@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "carillon/v1/modal_model_service.pb.h"
+#include "server/mode_database/utf8_prefix.h"
 #include "tests/server/mode_database/database_fixture.h"
 
 namespace carillon {
@@ -12,79 +13,13 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class ModeDatabaseTest : public DatabaseTest {
- protected:
-  static std::string Export(ModeDatabase& database, const std::string& digest) {
-    auto records = database.models().Export(digest);
-    EXPECT_TRUE(records.ok()) << records.status();
-    std::string bytes;
-    while (true) {
-      const auto record = records->Next();
-      EXPECT_TRUE(record.ok()) << record.status();
-      if (!record.ok() || !record->has_value()) return bytes;
-      bytes += Delimited(**record);
-    }
-  }
-};
-
-TEST_F(ModeDatabaseTest, AStoredModelIsFoundAfterReopening) {
-  const ModalModel model = SampleModel(100, 1000);
-  ASSERT_TRUE(PutModel(a_, model, "bell").ok());
-  Reopen();
-  const auto found = database_->models().Find(a_);
-  ASSERT_TRUE(found.ok()) << found.status();
-  EXPECT_EQ((*found)->eigenvalues, model.eigenvalues);
-  EXPECT_EQ((*found)->shapes, model.shapes);
-  const auto summary = database_->models().Summary(a_);
-  ASSERT_TRUE(summary.ok()) << summary.status();
-  EXPECT_EQ(summary->label, "bell");
-  EXPECT_EQ(summary->header.solver(), "sample 1.0");
-  EXPECT_EQ(summary->header.mode_count(), 100U);
-  EXPECT_GT(summary->stored_bytes, model.shapes.size() * sizeof(float));
-}
-
-TEST_F(ModeDatabaseTest, WhatWasAcknowledgedIsInACopyTakenWithoutClosing) {
-  ASSERT_TRUE(PutModel(a_, SampleModel(100, 1000)).ok());
-  const auto mesh = database_->meshes().Put("solid");
-  ASSERT_TRUE(mesh.ok());
-  ASSERT_TRUE(database_->jobs().Put({.digest = b_, .request = "intent"}).ok());
-  // What a killed process leaves: the file and its log, nothing flushed or tidied.
-  const std::filesystem::path copy = folder_ / "copy.db";
-  std::filesystem::copy_file(file_, copy);
-  std::filesystem::copy_file(file_.string() + "-wal", copy.string() + "-wal");
-  const auto survivor = ModeDatabase::Open(copy, clock_);
-  ASSERT_TRUE(survivor.ok()) << survivor.status();
-  EXPECT_TRUE((*survivor)->models().Find(a_).ok());
-  EXPECT_TRUE((*survivor)->meshes().Find(mesh->digest).ok());
-  const auto job = (*survivor)->jobs().Find(b_);
-  ASSERT_TRUE(job.ok() && job->has_value());
-  EXPECT_EQ((*job)->request, "intent");
-}
-
-TEST_F(ModeDatabaseTest, ExportAndImportGiveIdenticalBytes) {
-  ASSERT_TRUE(PutModel(a_, SampleModel(100, 1000)).ok());
-  const std::string bytes = Export(*database_, a_);
-  EXPECT_EQ(bytes, ReadBytes(folder_ / "model"));
-
-  const auto other = ModeDatabase::Open(folder_ / "other.db", clock_);
-  ASSERT_TRUE(other.ok()) << other.status();
-  auto import = (*other)->models().Import(a_, "copy");
-  ASSERT_TRUE(import.ok()) << import.status();
-  for (const auto& record : SampleRecords(SampleModel(100, 1000))) {
-    ASSERT_TRUE(import->Append(record).ok());
-  }
-  const auto summary = import->Finish();
-  ASSERT_TRUE(summary.ok()) << summary.status();
-  EXPECT_EQ(summary->label, "copy");
-  EXPECT_EQ(Export(**other, a_), bytes);
-}
+using ModeDatabaseTest = DatabaseTest;
 
 TEST_F(ModeDatabaseTest, AnImportThatEndsEarlyLeavesNothing) {
-  auto import = database_->models().Import(a_, "");
-  ASSERT_TRUE(import.ok());
+  auto import = *database_->models().Import(a_, "");
   const auto records = SampleRecords(SampleModel(2, 4));
-  for (size_t i = 0; i + 1 < records.size(); ++i) ASSERT_TRUE(import->Append(records[i]).ok());
-  EXPECT_THAT(import->Finish().status().ToString(), HasSubstr("MODAL_MODEL_MALFORMED"));
+  for (size_t i = 0; i + 1 < records.size(); ++i) ASSERT_TRUE(import.Append(records[i]).ok());
+  EXPECT_THAT(import.Finish().status().ToString(), HasSubstr("MODAL_MODEL_MALFORMED"));
   EXPECT_THAT(database_->models().Find(a_).status().ToString(), HasSubstr("MODAL_MODEL_NOT_FOUND"));
 }
 
@@ -95,9 +30,8 @@ TEST_F(ModeDatabaseTest, ARefusedFileLeavesTheOldRevision) {
   WriteRecords(folder_ / "bad", records);
   EXPECT_THAT(database_->models().PutFile(a_, "", folder_ / "bad").status().ToString(),
               HasSubstr("MODAL_MODEL_CORRUPT"));
-  const auto found = database_->models().Find(a_);
-  ASSERT_TRUE(found.ok()) << found.status();
-  EXPECT_EQ((*found)->mode_count(), 2U);
+  const auto found = *database_->models().Find(a_);
+  EXPECT_EQ(found->mode_count(), 2U);
 }
 
 TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExportedOrRead) {
@@ -105,10 +39,9 @@ TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExportedOrRead
   model.couplings = {1.234567890123, 2.345678901234, 3.456789012345};
   ASSERT_TRUE(PutModel(a_, model).ok());
   FlipABitWithin({reinterpret_cast<const char*>(model.couplings.data()), 24});
-  auto records = database_->models().Export(a_);
-  ASSERT_TRUE(records.ok()) << records.status();
+  auto records = *database_->models().Export(a_);
   absl::Status status;
-  for (int i = 0; status.ok() && i < 10; ++i) status = records->Next().status();
+  for (int i = 0; status.ok() && i < 10; ++i) status = records.Next().status();
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
   Reopen();  // without the quarantine of the export
   const auto found = database_->models().Find(a_);
@@ -118,10 +51,9 @@ TEST_F(ModeDatabaseTest, AFlippedBitInAnArrayIsFoundWhenTheModelIsExportedOrRead
 }
 
 TEST_F(ModeDatabaseTest, AFlippedBitInAMeshIsFoundWhenItIsWrittenOut) {
-  const auto mesh = database_->meshes().Put("solid of revolution");
-  ASSERT_TRUE(mesh.ok());
+  const auto mesh = *database_->meshes().Put("solid of revolution");
   FlipABitWithin("solid of revolution");
-  EXPECT_THAT(database_->meshes().WriteFile(mesh->digest, folder_ / "mesh").ToString(),
+  EXPECT_THAT(database_->meshes().WriteFile(mesh.digest, folder_ / "mesh").ToString(),
               HasSubstr("DATABASE_CORRUPT"));
 }
 
@@ -147,11 +79,10 @@ TEST_F(ModeDatabaseTest, AReplacedModelIsReadAnewAndKeepsItsLabel) {
 
 TEST_F(ModeDatabaseTest, AnExportOfAReplacedModelSaysSo) {
   ASSERT_TRUE(PutModel(a_, SampleModel(2, 4)).ok());
-  auto records = database_->models().Export(a_);
-  ASSERT_TRUE(records.ok());
-  ASSERT_TRUE(records->Next().ok());
+  auto records = *database_->models().Export(a_);
+  ASSERT_TRUE(records.Next().ok());
   ASSERT_TRUE(PutModel(a_, SampleModel(3, 4)).ok());
-  EXPECT_THAT(records->Next().status().ToString(), HasSubstr("MODAL_MODEL_REPLACED"));
+  EXPECT_THAT(records.Next().status().ToString(), HasSubstr("MODAL_MODEL_REPLACED"));
 }
 
 TEST_F(ModeDatabaseTest, DeletingAModelDeletesItsJob) {
@@ -193,8 +124,7 @@ TEST_F(ModeDatabaseTest, ListsTheModelsThatMatchEveryFieldOfAFilter) {
 }
 
 TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned) {
-  const std::string c = Sha256Hex("c");
-  const std::string d = Sha256Hex("d");
+  const std::string c = Sha256Hex("c"), d = Sha256Hex("d");
   for (const std::string& digest : {a_, b_, c, d}) {
     ASSERT_TRUE(PutModel(digest, SampleModel(10, 100)).ok());
   }
@@ -206,10 +136,9 @@ TEST_F(ModeDatabaseTest, CollectionTakesTheLeastRecentlySoundedAndNeverThePinned
   EXPECT_GT(database_->models().List({}, 10, "")->models[2].sounded_unix_ms, 0);
   const auto sounds = database_->models().Find(c);
   EXPECT_EQ(database_->models().Collect(4 * size)->model_count, 0U);
-  const auto first = database_->models().Collect(3 * size);
-  ASSERT_TRUE(first.ok()) << first.status();
-  EXPECT_EQ(first->model_count, 1U);
-  EXPECT_EQ(first->bytes, size);
+  const auto first = *database_->models().Collect(3 * size);
+  EXPECT_EQ(first.model_count, 1U);
+  EXPECT_EQ(first.bytes, size);
   EXPECT_FALSE(database_->models().Find(d).ok()) << "stored after all others, but b sounded since";
   EXPECT_EQ(database_->models().Collect(0)->model_count, 1U) << "b; a is pinned, c in memory";
   EXPECT_TRUE(database_->models().Find(a_).ok());
@@ -222,12 +151,11 @@ TEST_F(ModeDatabaseTest, AModelJustStoredStaysUntilANewerOneNeedsTheRoom) {
   EXPECT_TRUE(database_->models().Find(a_).ok()) << "though it alone is beyond the budget";
   ASSERT_TRUE(PutModel(a_, SampleModel(20, 100)).ok());
   EXPECT_TRUE(database_->models().Find(a_).ok()) << "its next revision, too";
-  auto import = database_->models().Import(b_, "");
-  ASSERT_TRUE(import.ok());
+  auto import = *database_->models().Import(b_, "");
   for (const v1::ModalModelRecord& record : SampleRecords(SampleModel(10, 100))) {
-    ASSERT_TRUE(import->Append(record).ok());
+    ASSERT_TRUE(import.Append(record).ok());
   }
-  ASSERT_TRUE(import->Finish().ok());
+  ASSERT_TRUE(import.Finish().ok());
   EXPECT_TRUE(absl::IsNotFound(database_->models().Find(a_).status()));
   EXPECT_TRUE(database_->models().Find(b_).ok());
 }
@@ -262,10 +190,9 @@ TEST_F(ModeDatabaseTest, AMeshThatNothingRefersToGoesADayAfterItsLastUpload) {
   clock.unix_ms = 2 * day_ms - 1;
   EXPECT_EQ(meshes.Collect()->mesh_count, 0U) << "it was uploaded again";
   clock.unix_ms = 2 * day_ms;
-  const auto collected = meshes.Collect();
-  ASSERT_TRUE(collected.ok()) << collected.status();
-  EXPECT_EQ(collected->mesh_count, 1U);
-  EXPECT_EQ(collected->bytes, unused.byte_count);
+  const auto collected = *meshes.Collect();
+  EXPECT_EQ(collected.mesh_count, 1U);
+  EXPECT_EQ(collected.bytes, unused.byte_count);
   EXPECT_TRUE(absl::IsNotFound(meshes.Find(unused.digest).status()));
   EXPECT_TRUE(meshes.Find(of_model.digest).ok());
   EXPECT_TRUE(meshes.Find(of_job.digest).ok());
@@ -274,16 +201,14 @@ TEST_F(ModeDatabaseTest, AMeshThatNothingRefersToGoesADayAfterItsLastUpload) {
 TEST_F(ModeDatabaseTest, AMeshSentInPiecesComesBackWhole) {
   std::string bytes;
   for (int i = 0; i < 600'000; ++i) bytes += "v 1 ";
-  auto upload = database_->meshes().Begin();
-  ASSERT_TRUE(upload.ok()) << upload.status();
+  auto upload = *database_->meshes().Begin();
   for (size_t at = 0; at < bytes.size(); at += 100'001) {
-    ASSERT_TRUE(upload->Append(std::string_view(bytes).substr(at, 100'001)).ok());
+    ASSERT_TRUE(upload.Append(std::string_view(bytes).substr(at, 100'001)).ok());
   }
-  const auto mesh = upload->Finish();
-  ASSERT_TRUE(mesh.ok()) << mesh.status();
-  EXPECT_EQ(mesh->digest, Sha256Hex(bytes));
-  EXPECT_EQ(mesh->byte_count, bytes.size());
-  ASSERT_TRUE(database_->meshes().WriteFile(mesh->digest, folder_ / "mesh").ok());
+  const auto mesh = *upload.Finish();
+  EXPECT_EQ(mesh.digest, Sha256Hex(bytes));
+  EXPECT_EQ(mesh.byte_count, bytes.size());
+  ASSERT_TRUE(database_->meshes().WriteFile(mesh.digest, folder_ / "mesh").ok());
   EXPECT_EQ(ReadBytes(folder_ / "mesh"), bytes);
   EXPECT_EQ(std::filesystem::status(folder_ / "mesh").permissions(),
             std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
@@ -303,19 +228,30 @@ TEST_F(ModeDatabaseTest, UnfinishedJobsComeBackInTheOrderTheyWereAskedFor) {
           .ok());
   Reopen();
   std::vector<std::string> digests;
-  const auto unfinished = database_->jobs().Unfinished();
-  ASSERT_TRUE(unfinished.ok()) << unfinished.status();
-  for (const JobRecord& job : *unfinished) digests.push_back(job.digest);
+  const auto unfinished = *database_->jobs().Unfinished();
+  for (const JobRecord& job : unfinished) digests.push_back(job.digest);
   EXPECT_THAT(digests, ElementsAre(b_, a_));
   const auto failed = database_->jobs().Find(c);
   ASSERT_TRUE(failed.ok() && failed->has_value());
   EXPECT_TRUE((*failed)->remembered);
   EXPECT_EQ((*failed)->error.reason(), "MESH_NOT_CLOSED");
-  const auto page = database_->jobs().List(2, "");
-  ASSERT_TRUE(page.ok());
-  ASSERT_EQ(page->jobs.size(), 2U);
-  EXPECT_EQ(page->jobs[0].digest, c);
-  EXPECT_EQ(database_->jobs().List(2, page->next_page_token)->jobs[0].digest, b_);
+  const auto page = *database_->jobs().List(2, "");
+  ASSERT_EQ(page.jobs.size(), 2U);
+  EXPECT_EQ(page.jobs[0].digest, c);
+  EXPECT_EQ(database_->jobs().List(2, page.next_page_token)->jobs[0].digest, b_);
+}
+
+TEST(Utf8Prefix, TextThatFitsStaysAndALetterThatIsCutIsLeftOut) {
+  for (const char* text : {"", "bell", "Glöckchen", "鐘", "🔔"}) {
+    EXPECT_EQ(Utf8Prefix(text, 20), text);
+  }
+  EXPECT_EQ(Utf8Prefix("aö", 2), "a");
+  EXPECT_EQ(Utf8Prefix("a鐘", 3), "a");
+  EXPECT_EQ(Utf8Prefix("a鐘", 4), "a鐘");
+  for (const size_t max_bytes : {1U, 2U, 3U}) EXPECT_EQ(Utf8Prefix("🔔", max_bytes), "");
+  EXPECT_EQ(Utf8Prefix("ab", 1), "a");
+  EXPECT_EQ(Utf8Prefix("bell \xE9\x90", 200), "bell ") << "the text ends within a letter";
+  EXPECT_EQ(Utf8Prefix("\x90\x90", 200), "");
 }
 
 }  // namespace

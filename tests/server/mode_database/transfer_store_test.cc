@@ -22,12 +22,12 @@ class TransferStoreTest : public DatabaseTest {
     ASSERT_TRUE(DatabaseTest::PutModel(digest_, model).ok());
   }
 
-  absl::Status Put(const ModalModel& model, double speed_ratio, float integral = 2) {
+  absl::Status Put(const ModalModel& model, double speed_ratio, float integral = 2,
+                   Replacing replacing = Replacing::kAlways) {
     const std::vector<float> integrals(model.mode_count(), integral);
-    return database_->transfers()
-        .Put(digest_,
-             SampleTransfer(model, {.speed_ratio = speed_ratio, .power_integrals = integrals}))
-        .status();
+    const StoredTransfer transfer =
+        SampleTransfer(model, {.speed_ratio = speed_ratio, .power_integrals = integrals});
+    return database_->transfers().Put(digest_, transfer, replacing).status();
   }
 
   /// The power integral of the first mode for a material of this speed ratio; 0: no transfer.
@@ -91,15 +91,11 @@ TEST_F(TransferStoreTest, RefusesATransferOfOtherModes) {
 TEST_F(TransferStoreTest, ATransferThatChangedOnTheDiskIsLeftOutAndReported) {
   PutModel(model_);
   ASSERT_TRUE(Put(model_, 10, 1.2345678F).ok());
-  database_.reset();  // all of the log goes into the file
-  std::string content = ReadBytes(file_);
   const float integral = 1.2345678F;
-  const size_t at = content.find(std::string(reinterpret_cast<const char*>(&integral), 4));
-  ASSERT_NE(at, std::string::npos);
-  content[at] ^= 1;
-  WriteBytes(file_, content);
+  FlipABitWithin({reinterpret_cast<const char*>(&integral), sizeof integral});
   std::vector<std::string> findings;
   const auto note = [&](const std::string& finding) { findings.push_back(finding); };
+  database_.reset();
   ASSERT_TRUE(CheckDatabase(file_, note).ok());
   EXPECT_THAT(findings, ElementsAre(HasSubstr("a transfer of modalModels/")));
   Reopen();
@@ -146,6 +142,87 @@ TEST(StoredTransfer, EveryDamageIsRefused) {
   std::string changed = whole;
   changed[changed.find(std::string(reinterpret_cast<const char*>(&integral), 4)) + 2] ^= 1;
   EXPECT_THAT(StoredTransfer::Parse(changed).status().ToString(), HasSubstr("TRANSFER_CORRUPT"));
+}
+
+class ModelImportTest : public TransferStoreTest {
+ protected:
+  absl::StatusOr<ModelSummary> Import(const ModalModel& model,
+                                      Replacing replacing = Replacing::kNever,
+                                      const std::string& label = "") {
+    auto import = database_->models().Import(digest_, label, replacing);
+    if (!import.ok()) return import.status();
+    for (const v1::ModalModelRecord& record : SampleRecords(model)) {
+      if (const absl::Status taken = import->Append(record); !taken.ok()) return taken;
+    }
+    auto summary = import->Finish();
+    if (summary.ok()) kept_ = import->kept();
+    return summary;
+  }
+
+  absl::Status PutTransfer(float integral, Replacing replacing, double speed_ratio = 14) {
+    return Put(model_, speed_ratio, integral, replacing);
+  }
+
+  size_t StoredModeCount() {
+    const auto model = database_->models().Find(digest_);
+    return model.ok() ? (*model)->mode_count() : 0;
+  }
+
+  /// Changes a byte of the stored mode shapes.
+  void Damage() {
+    FlipABitWithin({reinterpret_cast<const char*>(model_.shapes.data()),
+                    model_.shapes.size() * sizeof(float)});
+  }
+
+  bool kept_ = false;
+};
+
+TEST_F(ModelImportTest, OfTheSameContentChangesNothing) {
+  const auto first = *Import(model_, Replacing::kNever, "first");
+  EXPECT_FALSE(kept_);
+  ASSERT_TRUE(database_->models().Update(digest_, {.add_tags = {"bell"}, .pinned = true}).ok());
+  const auto second = *Import(model_, Replacing::kNever, "second");
+  EXPECT_TRUE(kept_);
+  EXPECT_EQ(second.revision, first.revision);
+  EXPECT_EQ(second.label, "first");
+  EXPECT_EQ(second.tags, std::vector<std::string>{"bell"});
+  EXPECT_TRUE(second.pinned);
+  ASSERT_TRUE(Import(model_, Replacing::kUnlessPinned).ok());
+  EXPECT_EQ(database_->models().Summary(digest_)->revision, first.revision);
+}
+
+TEST_F(ModelImportTest, OfAnotherHeaderIsOtherContent) {
+  ModalModel renamed = model_;
+  renamed.complete_to_eigenvalue *= 2;
+  ASSERT_TRUE(Import(model_).ok());
+  EXPECT_EQ(Import(renamed).status().code(), absl::StatusCode::kAlreadyExists);
+}
+
+TEST_F(ModelImportTest, RepairsAModelThatHasChangedOnTheDisk) {
+  ASSERT_TRUE(Import(model_).ok());
+  Damage();
+  ASSERT_TRUE(Import(model_).ok()) << "before anybody has noticed the damage";
+  EXPECT_FALSE(kept_);
+  EXPECT_EQ(StoredModeCount(), 3U);
+  Damage();
+  EXPECT_TRUE(absl::IsDataLoss(database_->models().Find(digest_).status()));
+  ASSERT_TRUE(Import(model_).ok()) << "out of quarantine";
+  EXPECT_EQ(StoredModeCount(), 3U);
+}
+
+TEST_F(ModelImportTest, AStoredModelGetsNoTransferFromAnImportThatMayNotReplace) {
+  ASSERT_TRUE(Import(model_).ok());
+  EXPECT_EQ(PutTransfer(1, Replacing::kNever).code(), absl::StatusCode::kAlreadyExists);
+  ASSERT_TRUE(PutTransfer(1, Replacing::kAlways).ok());
+  EXPECT_TRUE(PutTransfer(1, Replacing::kNever).ok()) << "it is the same";
+  EXPECT_THAT(PutTransfer(2, Replacing::kNever).ToString(), HasSubstr("MODAL_MODEL_EXISTS"));
+  EXPECT_TRUE(PutTransfer(2, Replacing::kUnlessPinned).ok());
+  ASSERT_TRUE(database_->models().Update(digest_, {.pinned = true}).ok());
+  EXPECT_THAT(PutTransfer(1, Replacing::kUnlessPinned).ToString(), HasSubstr("unpin"));
+  EXPECT_TRUE(PutTransfer(1, Replacing::kUnlessPinned, 10).ok()) << "it replaces nothing";
+  const auto stored = *database_->transfers().Read(digest_);
+  ASSERT_EQ(stored.size(), 2U);
+  EXPECT_EQ(stored.back().Decode().power_integrals.front(), 2);
 }
 
 }  // namespace

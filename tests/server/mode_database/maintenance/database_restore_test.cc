@@ -2,27 +2,12 @@
 //
 // A copy takes the place of a database.
 
-#include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <linux/fs.h>
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <fstream>
-#include <memory>
-#include <string>
-#include <vector>
 
-#include "server/base/clock.h"
-#include "server/base/sha256.h"
-#include "server/mode_database/database.h"
 #include "server/mode_database/database_files.h"
 #include "server/mode_database/maintenance/database_admin.h"
-#include "server/mode_database/mode_database.h"
 #include "server/mode_database/sqlite_connection.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/mode_database/database_fixture.h"
 
 namespace carillon {
 namespace {
@@ -84,8 +69,7 @@ class DatabaseRestoreTest : public ::testing::Test {
 TEST_F(DatabaseRestoreTest, ADatabaseIsRestoredWithItsLog) {
   Put(file_, "old");
   CopyWithLog("copy");
-  const auto kept = RestoreDatabase(file_, folder_ / "copy");
-  ASSERT_TRUE(kept.ok()) << kept.status();
+  ASSERT_TRUE(RestoreDatabase(file_, folder_ / "copy").ok());
   EXPECT_THAT(Labels(file_), ElementsAre("in the log"));
 }
 
@@ -93,11 +77,10 @@ TEST_F(DatabaseRestoreTest, TheNewDatabaseDoesNotGetTheLogOfTheOld) {
   CopyWithLog("carillon.db");
   std::ofstream(folder_ / "carillon.db-shm") << "an index";
   Put(folder_ / "copy", "new");
-  const auto kept = RestoreDatabase(file_, folder_ / "copy");
-  ASSERT_TRUE(kept.ok()) << kept.status();
+  const auto kept = *RestoreDatabase(file_, folder_ / "copy");
   EXPECT_THAT(Names(), Not(Contains(testing::AnyOf("carillon.db-wal", "carillon.db-shm"))));
   EXPECT_THAT(Labels(file_), ElementsAre("new"));
-  EXPECT_THAT(Labels(*kept), ElementsAre("in the log"));
+  EXPECT_THAT(Labels(kept), ElementsAre("in the log"));
 }
 
 TEST_F(DatabaseRestoreTest, AFileThatIsNoDatabaseOfCarillonReplacesNothing) {
@@ -140,11 +123,10 @@ TEST_F(DatabaseRestoreTest, ARestoreFollowsLinksToItsFiles) {
   std::filesystem::create_symlink(disk / "real.db", file_);
   CopyWithLog("copy");
   std::filesystem::create_symlink("copy", folder_ / "newest");
-  const auto kept = RestoreDatabase(file_, folder_ / "newest");
-  ASSERT_TRUE(kept.ok()) << kept.status();
+  const auto kept = *RestoreDatabase(file_, folder_ / "newest");
   EXPECT_TRUE(std::filesystem::is_symlink(file_));
   EXPECT_THAT(Labels(disk / "real.db"), ElementsAre("in the log"));
-  EXPECT_THAT(Labels(*kept), ElementsAre("old"));
+  EXPECT_THAT(Labels(kept), ElementsAre("old"));
   std::filesystem::remove(disk / "real.db");
   EXPECT_THAT(RestoreDatabase(file_, folder_ / "copy").status().ToString(),
               HasSubstr("it is a symbolic link that leads to no file"));
