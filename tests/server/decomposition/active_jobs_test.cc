@@ -7,8 +7,10 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <random>
 
 #include "absl/strings/str_cat.h"
+#include "server/decomposition/fair_queue.h"
 
 namespace carillon {
 namespace {
@@ -18,17 +20,13 @@ using ::testing::IsEmpty;
 
 class ActiveJobsTest : public ::testing::Test {
  protected:
-  void AddModel(const std::string& digest, uint64_t bytes = 1) {
-    jobs_->Add({.record = {.digest = digest, .label = "the " + digest},
+  void Add(const std::string& digest, uint64_t bytes, const std::string& transfer_of) {
+    jobs_->Add({.record = {.digest = digest, .transfer_of = transfer_of, .label = "the " + digest},
                 .request = {},
                 .guess_bytes = bytes});
   }
-
-  void AddTransfer(const std::string& digest, uint64_t bytes = 1) {
-    jobs_->Add({.record = {.digest = digest, .transfer_of = "model", .label = "the " + digest},
-                .request = {},
-                .guess_bytes = bytes});
-  }
+  void AddModel(const std::string& digest, uint64_t bytes = 1) { Add(digest, bytes, ""); }
+  void AddTransfer(const std::string& digest, uint64_t bytes = 1) { Add(digest, bytes, "model"); }
 
   /// Starts the jobs that can start, and returns their digests.
   std::vector<std::string> Start() {
@@ -163,6 +161,31 @@ TEST_F(ActiveJobsTest, TellsThoseThatWatchWaitingJobsOfTheirPlaceInTheQueue) {
   Start();
   for (const Notice& news : jobs_->NewsOfWaiting()) news.Tell();
   EXPECT_THAT(told, ElementsAre(1, 0));
+}
+
+TEST(FairQueue, ItsOrderIsThatOfTheStarts) {
+  std::mt19937 random(7);
+  FairQueue queue;
+  for (const char* client : {"a", "b", "c"}) queue.NoteStart(client);
+  std::map<std::string, FairQueue::Entry> entries;
+  for (uint64_t number = 0; number < 60; ++number) {
+    FairQueue::Entry entry{.client = std::string(1, static_cast<char>('a' + random() % 5)),
+                           .priority = static_cast<int32_t>(random() % 3),
+                           .number = number,
+                           .digest = absl::StrCat(number)};
+    queue.Add(entry);
+    entries[entry.digest] = entry;
+  }
+  const std::vector<absl::string_view> views = queue.Order();
+  const std::vector<std::string> order(views.begin(), views.end());
+  std::vector<std::string> starts;
+  while (const auto next = queue.Next()) {
+    starts.push_back(*next);
+    queue.NoteStart(entries.at(*next).client);
+    queue.Remove(entries.at(*next));
+  }
+  EXPECT_EQ(starts.size(), entries.size());
+  EXPECT_EQ(order, starts);
 }
 
 }  // namespace

@@ -27,13 +27,10 @@ class BusyDiskTest : public DecompositionQueueTest {
   BusyDiskTest() {
     Open("busy.db");
     EXPECT_EQ(database_->meshes().Put("solid")->digest, mesh_);
-    // Larger than SQLite's cache, so that writes begin long before a transaction ends.
-    ModalModel model = SampleModel(20, 40'000);
-    model.complete_to_eigenvalue = WantedEigenvalue(*ResolveRequest(Request(0)));
-    std::vector<v1::ModalModelRecord> records = SampleRecords(model);
-    // The node count of coarse models.
-    records[0].mutable_header()->mutable_settings()->mutable_mesh()->set_target_node_count(300);
-    WriteRecords(folder_ / "model", records);
+    // Larger than SQLite's cache, so that writes begin long before a transaction ends. The node
+    // count is that of coarse models.
+    WriteModel("model", WantedEigenvalue(*ResolveRequest(Request(0))), 300,
+               SampleModel(20, 40'000));
     WriteBytes(folder_ / "events", ProgressBytes(0.75));
     options_.worker_count = 2;
     MakeQueue(kWork);
@@ -54,10 +51,11 @@ class BusyDiskTest : public DecompositionQueueTest {
     return RequestDigest(*ResolveRequest(request));
   }
 
-  std::unique_ptr<JobWatch> SubmitAndWatch(const v1::CreateModalModelRequest& request,
-                                           Diary& observer) {
-    EXPECT_TRUE(queue_->Submit(request).ok());
-    return Watch(DigestOf(request), observer);
+  /// Submits a job, and returns its digest once it is in a state.
+  std::string SubmitAndAwait(const v1::CreateModalModelRequest& request, v1::JobState state) {
+    Submit(request);
+    Await(DigestOf(request), state);
+    return DigestOf(request);
   }
 
   // Whether `call` returns while the disk holds a write. A call that waits for the disk is released
@@ -71,15 +69,10 @@ class BusyDiskTest : public DecompositionQueueTest {
 
   // List, Get and Watch of `running`, a job that runs, return while the disk holds a write.
   void ExpectReadersAreServed(const std::string& running) {
+    EXPECT_TRUE(ReturnsWhileHeld([&] { EXPECT_FALSE(queue_->List(0, "")->jobs.empty()); }))
+        << "List waits for the disk";
     EXPECT_TRUE(ReturnsWhileHeld([&] {
-      const auto page = queue_->List(0, "");
-      ASSERT_TRUE(page.ok()) << page.status();
-      EXPECT_FALSE(page->jobs.empty());
-    })) << "List waits for the disk";
-    EXPECT_TRUE(ReturnsWhileHeld([&] {
-      const auto job = queue_->Get(running);
-      ASSERT_TRUE(job.ok()) << job.status();
-      EXPECT_EQ(job->state(), v1::JOB_STATE_RUNNING);
+      EXPECT_EQ(queue_->Get(running)->state(), v1::JOB_STATE_RUNNING);
     })) << "Get waits for the disk";
     Diary observer;
     std::unique_ptr<JobWatch> watch;
@@ -95,28 +88,25 @@ class BusyDiskTest : public DecompositionQueueTest {
 };
 
 TEST_F(BusyDiskTest, ReadersAndProgressAreServedWhileAModelIsStored) {
-  Diary first, second;
-  const auto watch1 = SubmitAndWatch(Request(1), first);
-  const auto watch2 = SubmitAndWatch(Request(2), second);
-  first.Await(v1::JOB_STATE_RUNNING);
-  second.Await(v1::JOB_STATE_RUNNING);
+  const std::string first = SubmitAndAwait(Request(1), v1::JOB_STATE_RUNNING);
+  Diary second;
+  const auto watch = Watch(SubmitAndAwait(Request(2), v1::JOB_STATE_RUNNING), second);
   FaultyDisk::HoldWritesAfter(20);
   gate1_.Open();
   ASSERT_TRUE(FaultyDisk::AwaitHeldWrite());
-  ExpectReadersAreServed(DigestOf(Request(1)));
+  ExpectReadersAreServed(first);
   gate2_.Open();
   second.AwaitThat([](const v1::Job& job) { return job.progress().fraction() == 0.75; });
   EXPECT_TRUE(FaultyDisk::AwaitHeldWrite());
   FaultyDisk::ReleaseWrites();
-  first.Await(v1::JOB_STATE_SUCCEEDED);
+  Await(first, v1::JOB_STATE_SUCCEEDED);
   gate2_.Open();
   second.Await(v1::JOB_STATE_SUCCEEDED);
 }
 
 TEST_F(BusyDiskTest, AResultWaitsForAProcessThatHoldsTheDatabase) {
   Diary observer;
-  const auto watch = SubmitAndWatch(Request(1), observer);
-  observer.Await(v1::JOB_STATE_RUNNING);
+  const auto watch = Watch(SubmitAndAwait(Request(1), v1::JOB_STATE_RUNNING), observer);
   const auto other = *SqliteConnection::Open(folder_ / "busy.db");
   ASSERT_TRUE(other->Run("BEGIN IMMEDIATE").ok());
   gate1_.Open();
@@ -129,16 +119,13 @@ TEST_F(BusyDiskTest, AResultWaitsForAProcessThatHoldsTheDatabase) {
 TEST_F(BusyDiskTest, ReadersAreServedWhileACoarseModelIsCopied) {
   v1::CreateModalModelRequest fine = Request(0);
   fine.set_coarse_first(true);
-  Diary coarse, running;
-  const auto watch_coarse = SubmitAndWatch(*CoarseRequest(*ResolveRequest(fine), 5), coarse);
-  coarse.Await(v1::JOB_STATE_SUCCEEDED);
-  const auto watch_running = SubmitAndWatch(Request(1), running);
-  running.Await(v1::JOB_STATE_RUNNING);
+  SubmitAndAwait(*CoarseRequest(*ResolveRequest(fine), 5), v1::JOB_STATE_SUCCEEDED);
+  const std::string running = SubmitAndAwait(Request(1), v1::JOB_STATE_RUNNING);
   FaultyDisk::HoldWritesAfter(20);
   auto submitted = std::async(std::launch::async, [&] { return queue_->Submit(fine); });
   ASSERT_TRUE(FaultyDisk::AwaitHeldWrite());
   EXPECT_FALSE(database_->jobs().Find(DigestOf(fine))->has_value()) << "the copy is not written";
-  ExpectReadersAreServed(DigestOf(Request(1)));
+  ExpectReadersAreServed(running);
   const auto keep_material = [](const std::string&, const v1::Material&) { return false; };
   EXPECT_TRUE(ReturnsWhileHeld([&] {
     EXPECT_TRUE(queue_->Submit(Request(1), {}, keep_material).ok());
@@ -147,23 +134,20 @@ TEST_F(BusyDiskTest, ReadersAreServedWhileACoarseModelIsCopied) {
   ASSERT_TRUE(submitted.get().ok());
   EXPECT_TRUE(queue_->Get(DigestOf(fine))->coarse_ready());
   gate1_.Open();
-  running.Await(v1::JOB_STATE_SUCCEEDED);
+  Await(running, v1::JOB_STATE_SUCCEEDED);
 }
 
 TEST_F(BusyDiskTest, ReadersAreServedWhileASubmitAndACancelAreStored) {
-  Diary running;
-  const auto watch = SubmitAndWatch(Request(1), running);
-  running.Await(v1::JOB_STATE_RUNNING);
+  const std::string running = SubmitAndAwait(Request(1), v1::JOB_STATE_RUNNING);
   FaultyDisk::HoldWritesAfter(0);
   auto submitted = std::async(std::launch::async, [&] { return queue_->Submit(Request(3)); });
-  auto cancelled =
-      std::async(std::launch::async, [&] { return queue_->Cancel(DigestOf(Request(1))); });
+  auto cancelled = std::async(std::launch::async, [&] { return queue_->Cancel(running); });
   ASSERT_TRUE(FaultyDisk::AwaitHeldWrite());
-  ExpectReadersAreServed(DigestOf(Request(1)));
+  ExpectReadersAreServed(running);
   FaultyDisk::ReleaseWrites();
   EXPECT_TRUE(submitted.get().ok());
   EXPECT_TRUE(cancelled.get().ok());
-  running.Await(v1::JOB_STATE_CANCELLED);
+  Await(running, v1::JOB_STATE_CANCELLED);
 }
 
 }  // namespace

@@ -26,17 +26,8 @@ class CoarseFirstTest : public DecompositionQueueTest {
     resolved_ = *ResolveRequest(request_);
     fine_ = RequestDigest(resolved_);
     coarse_ = RequestDigest(*CoarseRequest(resolved_, 5));
-    WriteModelOf(0, "fine");
-    WriteModelOf(300, "coarse");
-  }
-
-  void WriteModelOf(uint32_t node_count, const std::string& name) {
-    ModalModel model = SampleModel(3, 4);
-    model.complete_to_eigenvalue = WantedEigenvalue(resolved_);
-    std::vector<v1::ModalModelRecord> records = SampleRecords(model);
-    records[0].mutable_header()->mutable_settings()->mutable_mesh()->set_target_node_count(
-        node_count);
-    WriteRecords(folder_ / name, records);
+    WriteModel("fine", WantedEigenvalue(resolved_));
+    WriteModel("coarse", WantedEigenvalue(resolved_), 300);
   }
 
   void MakeQueue(const std::string& script) {
@@ -44,9 +35,8 @@ class CoarseFirstTest : public DecompositionQueueTest {
   }
 
   void Submit() {
-    const auto job = queue_->Submit(request_);
-    ASSERT_TRUE(job.ok()) << job.status();
-    EXPECT_EQ(job->name(), absl::StrCat("jobs/", fine_));
+    const auto job = *queue_->Submit(request_);
+    EXPECT_EQ(job.name(), absl::StrCat("jobs/", fine_));
   }
 
   uint32_t NodesAskedForBy(const std::string& digest) {
@@ -63,21 +53,18 @@ TEST_F(CoarseFirstTest, TheCoarseModelIsThereUnderTheNameUntilTheFineOneReplaces
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kFineWaitsAtGate, kWriteKind));
   Submit();
-  Diary observer;
-  const auto watch = Watch(fine_, observer);
-  EXPECT_TRUE(observer.Await(v1::JOB_STATE_RUNNING).coarse_ready());
+  EXPECT_TRUE(Await(fine_, v1::JOB_STATE_RUNNING).coarse_ready());
   EXPECT_EQ(NodesAskedForBy(fine_), 300U);
   EXPECT_EQ(database_->models().Summary(fine_)->label, "bowl");
-  const auto sounding = database_->models().FindToSound(fine_);
-  ASSERT_TRUE(sounding.ok()) << sounding.status();
+  const auto sounding = *database_->models().FindToSound(fine_);
   const int64_t revision = database_->models().Summary(fine_)->revision;
   gate.Open();
-  const v1::Job job = observer.AwaitEnd();
+  const v1::Job job = AwaitEnd(fine_);
   EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_FALSE(job.coarse_ready());
   EXPECT_EQ(NodesAskedForBy(fine_), 0U);
   EXPECT_GT(database_->models().Summary(fine_)->revision, revision);
-  EXPECT_EQ((*sounding)->eigenvalues.size(), 3U) << "what sounds keeps its model";
+  EXPECT_EQ(sounding->eigenvalues.size(), 3U) << "what sounds keeps its model";
   EXPECT_EQ(Runs(), "coarse\nfine\n");
 }
 
@@ -97,11 +84,7 @@ TEST_F(CoarseFirstTest, ADaemonKilledInBetweenGoesOnWithTheFineModel) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kFineWaitsAtGate, kWriteKind));
   Submit();
-  {
-    Diary observer;
-    const auto watch = Watch(fine_, observer);
-    observer.Await(v1::JOB_STATE_RUNNING);
-  }
+  Await(fine_, v1::JOB_STATE_RUNNING);
   Open("carillon.db");
   MakeQueue(kWriteKind);
   EXPECT_EQ(AwaitEnd(fine_).state(), v1::JOB_STATE_SUCCEEDED);
@@ -113,12 +96,8 @@ TEST_F(CoarseFirstTest, ADaemonKilledBeforeTheCoarseModelIsThereComputesBothInOr
   const Gate gate(folder_ / "gate");
   MakeQueue("read line <\"$here/gate\"\n");
   Submit();
-  {
-    Diary observer;
-    const auto watch = Watch(coarse_, observer);
-    observer.Await(v1::JOB_STATE_RUNNING);
-    EXPECT_EQ(queue_->Get(fine_)->state(), v1::JOB_STATE_QUEUED) << "though a worker is free";
-  }
+  Await(coarse_, v1::JOB_STATE_RUNNING);
+  EXPECT_EQ(queue_->Get(fine_)->state(), v1::JOB_STATE_QUEUED) << "though a worker is free";
   Open("carillon.db");
   std::filesystem::remove(folder_ / "runs");
   MakeQueue(kWriteKind);

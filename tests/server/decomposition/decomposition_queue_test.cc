@@ -48,11 +48,10 @@ TEST_F(DecompositionQueueTest, AModelRemembersTheMaterialThatItWasLastAskedForWi
   const v1::Job done = SubmitAndAwaitEnd(request);
   request.mutable_material()->set_preset("structural_steel");
   ASSERT_EQ(Submit(request).name(), done.name());
-  const auto material = database_->models().Material(DigestOf(done));
-  ASSERT_TRUE(material.ok() && material->has_value()) << material.status();
-  EXPECT_EQ((*material)->preset(), "structural_steel");
+  const v1::Material material = database_->models().Material(DigestOf(done))->value();
+  EXPECT_EQ(material.preset(), "structural_steel");
   // The ratio of the model, since the ratio of steel is another and would be refused.
-  EXPECT_EQ((*material)->poisson_ratio(), 0.25);
+  EXPECT_EQ(material.poisson_ratio(), 0.25);
 }
 
 TEST_F(DecompositionQueueTest, AModelThatIsNotCompleteFarEnoughIsComputedAgain) {
@@ -132,10 +131,8 @@ TEST_F(DecompositionQueueTest, AModelThatBreaksTheRulesIsAFailureAndNotStored) {
 TEST_F(DecompositionQueueTest, QueuedAndRunningJobsGoOnAfterTheDaemonWasKilled) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  Diary diary;
   const v1::Job running = Submit(Request(20'000, 1));
-  const auto watch = Watch(running, diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
+  Await(DigestOf(running), v1::JOB_STATE_RUNNING);
   const v1::Job queued = Submit(Request(20'000, 2));
   EXPECT_EQ(queued.state(), v1::JOB_STATE_QUEUED);
   // What kill -9 leaves: the database and its log as they are at this moment.
@@ -144,9 +141,7 @@ TEST_F(DecompositionQueueTest, QueuedAndRunningJobsGoOnAfterTheDaemonWasKilled) 
   Open("copy.db");
   MakeQueue(kSucceed);
   for (const v1::Job& job : {running, queued}) {
-    Diary again;
-    const auto watch_again = Watch(job, again);
-    EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(AwaitEnd(DigestOf(job)).state(), v1::JOB_STATE_SUCCEEDED);
     EXPECT_TRUE(database_->models().Find(DigestOf(job)).ok());
   }
 }
@@ -171,25 +166,31 @@ TEST_F(DecompositionQueueTest, ASubmitAfterACancelIsServedEvenIfTheWorkerStillDi
   const v1::Job job = Submit(Request(20'000));
   ASSERT_TRUE(started.GetsAByte());
   EXPECT_TRUE(queue_->Cancel(DigestOf(job)).ok());
-  Diary again;
-  const auto watch_again = Watch(Submit(Request(20'000)), again);
-  EXPECT_EQ(again.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(SubmitAndAwaitEnd(Request(20'000)).state(), v1::JOB_STATE_SUCCEEDED);
 }
 
-TEST_F(DecompositionQueueTest, ListsJobsNewestFirstAsTheyStandNow) {
+TEST_F(DecompositionQueueTest, AWatchMayEndItselfAndIsNotCalledAgain) {
   const Gate gate(folder_ / "gate");
   MakeQueue(absl::StrCat(kWaitAtGate, kSucceed));
-  const v1::Job first = Submit(Request(20'000, 1));
-  Diary diary;
-  const auto watch = Watch(first, diary);
-  diary.Await(v1::JOB_STATE_RUNNING);
-  const v1::Job second = Submit(Request(20'000, 2));
-  const auto page = queue_->List(0, "");
-  ASSERT_TRUE(page.ok()) << page.status();
-  ASSERT_EQ(page->jobs.size(), 2U);
-  EXPECT_EQ(page->jobs[0].name(), second.name());
-  EXPECT_EQ(page->jobs[0].state(), v1::JOB_STATE_QUEUED);
-  EXPECT_EQ(page->jobs[1].state(), v1::JOB_STATE_RUNNING);
+  const v1::Job job = Submit(Request(20'000));
+  std::mutex mutex;
+  std::unique_ptr<JobWatch> watch;
+  bool ended = false;
+  int calls_after_end = 0;
+  auto made = queue_->Watch(DigestOf(job), [&](const v1::Job&) {
+    const std::lock_guard lock(mutex);
+    if (ended) ++calls_after_end;
+    if (watch != nullptr) ended = true;
+    watch.reset();
+  });
+  {
+    const std::lock_guard lock(mutex);
+    if (!ended) watch = *std::move(made);
+  }
+  gate.Open();
+  AwaitEnd(DigestOf(job));
+  const std::lock_guard lock(mutex);
+  EXPECT_EQ(calls_after_end, 0);
 }
 
 TEST_F(DecompositionQueueTest, RefusesMoreThanItCanRemember) {

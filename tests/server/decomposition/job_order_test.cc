@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Which of the jobs that wait starts first, and how many may wait and run.
+// Which of the jobs that wait starts first, how many may wait and run, and who ends a job that
+// several clients have asked for.
 #include "absl/strings/str_cat.h"
+#include "server/decomposition/job/wanted_job.h"
 #include "tests/server/decomposition/queue_fixture.h"
 
 namespace carillon {
@@ -17,13 +19,17 @@ class JobOrderTest : public DecompositionQueueTest {
     MakeQueue(absl::StrCat("echo $nodes >>\"$here/order\"\n", kWaitAtGate, kSucceed));
   }
 
+  v1::Job SubmitWith(uint32_t nodes, int priority, const std::string& client = "") {
+    auto request = Request(20'000, nodes);
+    request.set_priority(priority);
+    return Submit(request, client);
+  }
+
   /// Lets `count` jobs run, of which `last` is the last, and returns the nodes of each, a line a
   /// job.
   std::string OrderOfRuns(const v1::Job& last, int count) {
-    Diary diary;
-    const auto watch = Watch(last, diary);
     for (int i = 0; i < count; ++i) gate_.Open();
-    diary.AwaitEnd();
+    AwaitEnd(DigestOf(last));
     return ReadBytes(folder_ / "order");
   }
 
@@ -32,40 +38,24 @@ class JobOrderTest : public DecompositionQueueTest {
 
 TEST_F(JobOrderTest, AHigherPriorityStartsFirstAndMayBeGivenLater) {
   MakeOrderedQueue();
-  const auto with_priority = [&](uint32_t nodes, int priority) {
-    auto request = Request(20'000, nodes);
-    request.set_priority(priority);
-    return request;
-  };
-  Diary first;
-  const auto watch = Watch(Submit(with_priority(1, 0)), first);
-  first.Await(v1::JOB_STATE_RUNNING);
-  const v1::Job last = Submit(with_priority(2, -1));
-  Submit(with_priority(3, 0));
-  Submit(with_priority(4, 5));
-  Submit(with_priority(5, 0));
-  EXPECT_EQ(Submit(with_priority(5, 7)).priority(), 7);
+  Await(DigestOf(SubmitWith(1, 0)), v1::JOB_STATE_RUNNING);
+  const v1::Job last = SubmitWith(2, -1);
+  SubmitWith(3, 0);
+  SubmitWith(4, 5);
+  SubmitWith(5, 0);
+  EXPECT_EQ(SubmitWith(5, 7).priority(), 7);
   EXPECT_EQ(OrderOfRuns(last, 5), "1\n5\n4\n3\n2\n");
 }
 
 TEST_F(JobOrderTest, ClientsTakeTurnsWhateverThePrioritiesOfTheirJobs) {
   MakeOrderedQueue();
-  const auto submit = [&](const std::string& client, uint32_t nodes, int priority) {
-    auto request = Request(20'000, nodes);
-    request.set_priority(priority);
-    const absl::StatusOr<v1::Job> job = queue_->Submit(request, client);
-    EXPECT_TRUE(job.ok()) << job.status();
-    return job.value_or(v1::Job());
-  };
-  Diary first;
-  const auto watch = Watch(submit("greedy", 1, 100), first);
-  first.Await(v1::JOB_STATE_RUNNING);
-  submit("greedy", 2, 100);
-  submit("greedy", 3, 100);
-  const v1::Job last = submit("greedy", 4, 100);
-  submit("modest", 5, 0);
-  submit("other", 6, -1);
-  submit("modest", 7, 1);
+  Await(DigestOf(SubmitWith(1, 100, "greedy")), v1::JOB_STATE_RUNNING);
+  SubmitWith(2, 100, "greedy");
+  SubmitWith(3, 100, "greedy");
+  const v1::Job last = SubmitWith(4, 100, "greedy");
+  SubmitWith(5, 0, "modest");
+  SubmitWith(6, -1, "other");
+  SubmitWith(7, 1, "modest");
   EXPECT_EQ(OrderOfRuns(last, 7), "1\n7\n6\n2\n5\n3\n4\n");
 }
 
@@ -91,11 +81,76 @@ TEST_F(JobOrderTest, NoMoreRunAtATimeThanAreEstimatedToFitIntoTheMemory) {
   std::vector<v1::Job> jobs;
   for (uint32_t i = 0; i < 4; ++i) jobs.push_back(Submit(Request(20'000, 600 + i)));
   for (const v1::Job& job : jobs) {
-    Diary diary;
-    const auto watch = Watch(job, diary);
-    EXPECT_EQ(diary.AwaitEnd().state(), v1::JOB_STATE_SUCCEEDED);
+    EXPECT_EQ(AwaitEnd(DigestOf(job)).state(), v1::JOB_STATE_SUCCEEDED);
   }
   EXPECT_FALSE(std::filesystem::exists(folder_ / "crowd"));
+}
+
+/// A first job keeps the worker busy, so that all others are queued.
+class JobCancelTest : public JobOrderTest {
+ protected:
+  void MakeBusyQueue() {
+    MakeOrderedQueue();
+    Await(DigestOf(SubmitWith(1, 0, "first")), v1::JOB_STATE_RUNNING);
+  }
+
+  v1::JobState CancelFor(const std::string& client, const v1::Job& job) {
+    return queue_->Cancel(DigestOf(job), client)->state();
+  }
+};
+
+TEST_F(JobCancelTest, AJobGoesOnUntilAllThatAskedForItHaveCancelledIt) {
+  MakeBusyQueue();
+  const v1::Job job = SubmitWith(2, 0, "alice");
+  SubmitWith(2, 0, "bob");
+  EXPECT_EQ(CancelFor("bob", job), v1::JOB_STATE_QUEUED);
+  EXPECT_EQ(CancelFor("bob", job), v1::JOB_STATE_QUEUED) << "a call may be repeated";
+  EXPECT_EQ(CancelFor("alice", job), v1::JOB_STATE_CANCELLED);
+}
+
+TEST_F(JobCancelTest, AStrangerIsRefusedAndACallForAllEndsTheJob) {
+  MakeBusyQueue();
+  const v1::Job job = SubmitWith(2, 0, "alice");
+  const auto refused = queue_->Cancel(DigestOf(job), "mallory");
+  EXPECT_TRUE(absl::IsPermissionDenied(refused.status()));
+  EXPECT_THAT(refused.status().ToString(), HasSubstr("JOB_OF_ANOTHER"));
+  EXPECT_EQ(queue_->Get(DigestOf(job))->state(), v1::JOB_STATE_QUEUED);
+  SubmitWith(2, 0, "bob");
+  EXPECT_EQ(queue_->Cancel(DigestOf(job))->state(), v1::JOB_STATE_CANCELLED);
+  EXPECT_EQ(CancelFor("mallory", job), v1::JOB_STATE_CANCELLED) << "it has ended";
+}
+
+TEST_F(JobCancelTest, AJobOfAnEarlierDaemonIsCancelledByThoseThatWantedItThere) {
+  MakeBusyQueue();
+  const v1::Job job = SubmitWith(2, 0, "alice");
+  SubmitWith(2, 0, "bob");
+  SubmitWith(2, 0, "mallory");
+  CancelFor("mallory", job);
+  MakeOrderedQueue();
+  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "mallory").status()));
+  EXPECT_NE(CancelFor("bob", job), v1::JOB_STATE_CANCELLED);
+  CancelFor("alice", job);
+  EXPECT_EQ(AwaitEnd(DigestOf(job)).state(), v1::JOB_STATE_CANCELLED);
+  // A job that is asked for again belongs to nobody who wanted the ended one.
+  SubmitWith(2, 0, "mallory");
+  MakeOrderedQueue();
+  EXPECT_TRUE(absl::IsPermissionDenied(queue_->Cancel(DigestOf(job), "alice").status()));
+}
+
+TEST_F(JobCancelTest, TheTransferOfAModelIsWantedByThoseThatWantTheModel) {
+  settings_.transfers = true;
+  // The transfer waits at the gate.
+  MakeQueue(absl::StrCat("grep -q radiate_stored_model \"$request\" && ", kWaitAtGate, kSucceed));
+  const v1::Job model = SubmitWith(2, 0, "alice");
+  SubmitWith(2, 0, "bob");
+  ASSERT_EQ(AwaitEnd(DigestOf(model)).state(), v1::JOB_STATE_SUCCEEDED);
+  const v1::CreateModalModelRequest resolved = *ResolveRequest(Request(20'000, 2));
+  const std::string transfer = WantedTransfer(DigestOf(model), resolved).digest;
+  EXPECT_THAT(queue_->Cancel(transfer, "mallory").status().ToString(), HasSubstr("JOB_OF_ANOTHER"));
+  ASSERT_TRUE(queue_->Cancel(transfer, "bob").ok());
+  EXPECT_EQ(queue_->Get(transfer)->state(), v1::JOB_STATE_RUNNING);
+  ASSERT_TRUE(queue_->Cancel(transfer, "alice").ok());
+  EXPECT_EQ(AwaitEnd(transfer).state(), v1::JOB_STATE_CANCELLED);
 }
 
 }  // namespace

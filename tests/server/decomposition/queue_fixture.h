@@ -28,7 +28,6 @@ class Diary {
  public:
   void Write(const v1::Job& job) {
     const std::lock_guard lock(mutex_);
-    if (states_.empty() || states_.back() != job.state()) states_.push_back(job.state());
     last_ = job;
     written_.notify_all();
   }
@@ -52,17 +51,11 @@ class Diary {
     return written_.wait_for(lock, time, [&] { return HasEnded(last_); });
   }
 
-  std::vector<v1::JobState> states() {
-    const std::lock_guard lock(mutex_);
-    return states_;
-  }
-
  private:
   static bool HasEnded(const v1::Job& job) { return job.state() >= v1::JOB_STATE_SUCCEEDED; }
 
   std::mutex mutex_;
   std::condition_variable written_;
-  std::vector<v1::JobState> states_;
   v1::Job last_;
 };
 
@@ -79,27 +72,25 @@ class DecompositionQueueTest : public ::testing::Test {
   DecompositionQueueTest() {
     Open("carillon.db");
     mesh_ = database_->meshes().Put("solid")->digest;
-    WriteModel("model10", 10'000);
-    WriteModel("model20", 20'000);
-    WriteModel("lowered", 5'000, 900);
+    const v1::CreateModalModelRequest resolved = *ResolveRequest(SampleRequest(mesh_));
+    WriteModel("model10", UnitEigenvalue(resolved, 10'000));
+    WriteModel("model20", UnitEigenvalue(resolved, 20'000));
   }
 
-  void WriteModel(const std::string& name, double frequency_hz, int lowered_from_mode_count = 0) {
-    ModalModel model = SampleModel(3, 4);
-    model.complete_to_eigenvalue =
-        UnitEigenvalue(*ResolveRequest(SampleRequest(mesh_)), frequency_hz);
+  /// Writes a model that is complete up to an eigenvalue, and was asked for with so many nodes.
+  void WriteModel(const std::string& name, double complete_to_eigenvalue, uint32_t node_count = 0,
+                  ModalModel model = SampleModel(3, 4)) {
+    model.complete_to_eigenvalue = complete_to_eigenvalue;
     auto records = SampleRecords(model);
-    records.front().mutable_header()->set_lowered_from_mode_count(
-        static_cast<uint32_t>(lowered_from_mode_count));
+    records[0].mutable_header()->mutable_settings()->mutable_mesh()->set_target_node_count(
+        node_count);
     WriteRecords(folder_ / name, records);
   }
 
   void Open(const std::string& name) {
     queue_.reset();
     database_.reset();
-    auto database = ModeDatabase::Open(folder_ / name, clock_);
-    ASSERT_TRUE(database.ok()) << database.status();
-    database_ = *std::move(database);
+    database_ = *ModeDatabase::Open(folder_ / name, clock_);
   }
 
   void MakeQueue(const std::string& script) {
@@ -112,11 +103,8 @@ class DecompositionQueueTest : public ::testing::Test {
   void StartQueue() {
     queue_.reset();
     options_.directory = folder_ / "running";
-    auto executor = MakeLocalExecutor(options_, clock_);
-    ASSERT_TRUE(executor.ok()) << executor.status();
-    auto queue = DecompositionQueue::Make(*database_, *std::move(executor), clock_, settings_);
-    ASSERT_TRUE(queue.ok()) << queue.status();
-    queue_ = *std::move(queue);
+    queue_ = *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options_, clock_), clock_,
+                                       settings_);
   }
 
   v1::CreateModalModelRequest Request(double max_frequency_hz, uint32_t node_count = 0) {
@@ -126,21 +114,19 @@ class DecompositionQueueTest : public ::testing::Test {
     return request;
   }
 
-  v1::Job Submit(const v1::CreateModalModelRequest& request) {
-    const auto job = queue_->Submit(request);
-    EXPECT_TRUE(job.ok()) << job.status();
-    return job.ok() ? *job : v1::Job();
+  v1::Job Submit(const v1::CreateModalModelRequest& request, const std::string& client = "") {
+    return *queue_->Submit(request, client);
   }
 
   std::unique_ptr<JobWatch> Watch(const std::string& digest, Diary& diary) {
-    auto watch = queue_->Watch(digest, [&diary](const v1::Job& now) { diary.Write(now); });
-    EXPECT_TRUE(watch.ok()) << watch.status();
-    return watch.ok() ? *std::move(watch) : nullptr;
-  }
-  std::unique_ptr<JobWatch> Watch(const v1::Job& job, Diary& diary) {
-    return Watch(DigestOf(job), diary);
+    return *queue_->Watch(digest, [&diary](const v1::Job& now) { diary.Write(now); });
   }
 
+  v1::Job Await(const std::string& digest, v1::JobState state) {
+    Diary diary;
+    const auto watch = Watch(digest, diary);
+    return diary.Await(state);
+  }
   v1::Job AwaitEnd(const std::string& digest) {
     Diary diary;
     const auto watch = Watch(digest, diary);

@@ -60,12 +60,12 @@ nodes=$(sed -n 's/^ *target_node_count: //p' "$request")
   return script;
 }
 
-/// A named pipe. It opens for reading without waiting for a writer.
+/// A named pipe. By default it opens for reading without waiting for a writer.
 class NamedPipe {
  public:
-  explicit NamedPipe(const std::filesystem::path& path) {
+  explicit NamedPipe(const std::filesystem::path& path, int flags = O_RDONLY | O_NONBLOCK) {
     mkfifo(path.c_str(), 0600);
-    descriptor_ = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    descriptor_ = open(path.c_str(), flags | O_CLOEXEC);
   }
   NamedPipe(const NamedPipe&) = delete;
   NamedPipe& operator=(const NamedPipe&) = delete;
@@ -88,26 +88,19 @@ class NamedPipe {
     return poll(&polled, 1, 20'000) == 1 && read(descriptor_, &byte, 1) == 1;
   }
 
+  /// Writes a line.
+  void WriteLine() const { [[maybe_unused]] const ssize_t n = write(descriptor_, "\n", 1); }
+
  private:
   int descriptor_;
 };
 
 /// A named pipe that scripts wait on ("read line <$here/gate") until they are let through.
-class Gate {
- public:
-  explicit Gate(const std::filesystem::path& path) {
-    mkfifo(path.c_str(), 0600);
-    descriptor_ = open(path.c_str(), O_RDWR | O_CLOEXEC);
-  }
-  Gate(const Gate&) = delete;
-  Gate& operator=(const Gate&) = delete;
-  ~Gate() { close(descriptor_); }
+struct Gate : NamedPipe {
+  explicit Gate(const std::filesystem::path& path) : NamedPipe(path, O_RDWR) {}
 
   /// Lets one script through, now or when it comes.
-  void Open() const { [[maybe_unused]] const ssize_t written = write(descriptor_, "\n", 1); }
-
- private:
-  int descriptor_;
+  void Open() const { WriteLine(); }
 };
 
 /// What an aluminum body of the mesh "solid" is asked for with.

@@ -16,18 +16,14 @@ namespace carillon {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::Not;
 
 // Writes down what is asked for.
 constexpr char kKind[] = R"(
 kind=model
 grep -q radiate_stored_model "$request" && kind=transfer
-cp "$mesh" "$here/input.$kind"
-cp "$request" "$here/request.$kind"
 echo $kind >>"$here/runs"
 )";
 constexpr char kWriteKind[] = "cp \"$here/$kind\" \"$out\"\n";
-constexpr char kTransferWaits[] = "case $kind in transfer) read line <\"$here/gate\";; esac\n";
 
 class TransferJobTest : public DecompositionQueueTest {
  protected:
@@ -37,13 +33,12 @@ class TransferJobTest : public DecompositionQueueTest {
     const v1::CreateModalModelRequest resolved = *ResolveRequest(request_);
     digest_ = RequestDigest(resolved);
     transfer_ = WantedTransfer(digest_, resolved).digest;
-    ModalModel model = SampleModel(3, 4);
-    model.complete_to_eigenvalue = WantedEigenvalue(resolved);
-    WriteRecords(folder_ / "model", SampleRecords(model));
+    WriteModel("model", WantedEigenvalue(resolved));
     const v1::Material& material = resolved.material();
     const double speed = std::sqrt(material.young_pa() / material.density_kg_per_m3());
-    WriteBytes(folder_ / "transfer", SampleTransferBytes(model, {.speed_ratio = speed / 343,
-                                                                 .power_integrals = {1, 2, 3}}));
+    WriteBytes(folder_ / "transfer",
+               SampleTransferBytes(SampleModel(3, 4),
+                                   {.speed_ratio = speed / 343, .power_integrals = {1, 2, 3}}));
   }
 
   void MakeQueue(const std::string& script, QueueSettings settings = {.transfers = true}) {
@@ -51,10 +46,7 @@ class TransferJobTest : public DecompositionQueueTest {
     DecompositionQueueTest::MakeQueue(absl::StrCat(kKind, script));
   }
 
-  void Submit() {
-    const auto job = queue_->Submit(request_);
-    ASSERT_TRUE(job.ok()) << job.status();
-  }
+  void Submit() { EXPECT_TRUE(queue_->Submit(request_).ok()); }
 
   size_t TransferCount() {
     const auto transfers = database_->transfers().List(digest_);
@@ -101,22 +93,6 @@ TEST_F(TransferJobTest, AFullDiskLosesNeitherTheEndOfAJobNorItsTransfer) {
   EXPECT_GT(failed_count, 5);
 }
 
-TEST_F(TransferJobTest, FollowsTheModelAndReadsItsStoredForm) {
-  MakeQueue(kWriteKind);
-  Submit();
-  EXPECT_EQ(AwaitEnd(digest_).kind(), v1::JOB_KIND_DECOMPOSITION);
-  const v1::Job job = AwaitEnd(transfer_);
-  EXPECT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED) << job.error().message();
-  EXPECT_EQ(job.kind(), v1::JOB_KIND_TRANSFER);
-  EXPECT_EQ(job.modal_model(), absl::StrCat("modalModels/", digest_));
-  EXPECT_EQ(job.label(), "bowl (transfer)");
-  EXPECT_EQ(TransferCount(), 1U);
-  EXPECT_EQ(Runs(), "model\ntransfer\n");
-  EXPECT_EQ(ReadBytes(folder_ / "input.transfer"), ReadBytes(folder_ / "model"));
-  EXPECT_THAT(ReadBytes(folder_ / "request.transfer"), Not(HasSubstr("budget_s")));
-  EXPECT_THAT(ReadBytes(folder_ / "request.model"), Not(HasSubstr("transfer")));
-}
-
 TEST_F(TransferJobTest, IsLeftOutWhereTheRequestOrTheDaemonSaysSo) {
   MakeQueue(kWriteKind, {});
   Submit();
@@ -142,9 +118,8 @@ TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
   *wanted.mutable_material() = *ResolveMaterial(wanted.material());
   wanted.mutable_material()->set_young_pa(2 * wanted.material().young_pa());
   wanted.mutable_material()->set_density_kg_per_m3(2 * wanted.material().density_kg_per_m3());
-  const auto again = queue_->SubmitTransfer(digest_, wanted);
-  ASSERT_TRUE(again.ok()) << again.status();
-  EXPECT_EQ(again->state(), v1::JOB_STATE_SUCCEEDED);
+  const auto again = *queue_->SubmitTransfer(digest_, wanted);
+  EXPECT_EQ(again.state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "model\ntransfer\n");
   wanted.mutable_settings()->set_accuracy_db(0.5);
   ASSERT_TRUE(queue_->SubmitTransfer(digest_, wanted).ok());
@@ -163,19 +138,6 @@ TEST_F(TransferJobTest, RefusesAModelThatIsNotStoredAndSettingsThatAreNone) {
               HasSubstr("INVALID_SETTINGS"));
 }
 
-TEST_F(TransferJobTest, GoesOnAfterTheDaemonEndedDuringIt) {
-  const Gate gate(folder_ / "gate");
-  MakeQueue(absl::StrCat(kTransferWaits, kWriteKind));
-  Submit();
-  AwaitEnd(digest_);
-  queue_.reset();
-  EXPECT_EQ(TransferCount(), 0U);
-  Open("carillon.db");
-  MakeQueue(kWriteKind);
-  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(TransferCount(), 1U);
-}
-
 TEST_F(TransferJobTest, IsMadeForAModelThatWasStoredJustBeforeTheDaemonDied) {
   ASSERT_TRUE(database_->models().PutFile(digest_, "bowl", folder_ / "model").ok());
   const std::string request = ResolveRequest(request_)->SerializeAsString();
@@ -184,18 +146,6 @@ TEST_F(TransferJobTest, IsMadeForAModelThatWasStoredJustBeforeTheDaemonDied) {
   EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(Runs(), "transfer\n");
-}
-
-TEST_F(TransferJobTest, ATransferOfOtherModesIsAFailureAndNotStored) {
-  MakeQueue("case $kind in transfer) kind=other;; esac\n" + std::string(kWriteKind));
-  WriteBytes(folder_ / "other",
-             SampleTransferBytes(SampleModel(2, 4), {.power_integrals = {1, 2}}));
-  Submit();
-  EXPECT_EQ(AwaitEnd(digest_).state(), v1::JOB_STATE_SUCCEEDED);
-  const v1::Job job = AwaitEnd(transfer_);
-  EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
-  EXPECT_EQ(job.error().reason(), "TRANSFER_MALFORMED");
-  EXPECT_EQ(TransferCount(), 0U);
 }
 
 }  // namespace

@@ -10,15 +10,19 @@
 #include <chrono>
 #include <future>
 #include <limits>
+#include <tuple>
+#include <vector>
 
 #include "server/base/sha256.h"
 #include "server/decomposition/job/decomposition_request.h"
+#include "server/decomposition/worker/worker_events.h"
 #include "tests/server/decomposition/scripted_worker.h"
 
 namespace carillon {
 namespace {
 
 using std::chrono::milliseconds;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr std::chrono::seconds kDeadline(30);
@@ -39,12 +43,12 @@ bool Happens(std::promise<void>& event) {
 
 class LocalExecutorTest : public ::testing::Test {
  protected:
-  void MakeExecutor(const std::string& script) {
+  void MakeExecutor(const std::string& script) { MakeExecutor(script, clock_); }
+
+  void MakeExecutor(const std::string& script, const Clock& clock) {
     options_.program = WriteWorkerScript(folder_.path(), script);
     options_.directory = folder_ / "running";
-    auto executor = MakeLocalExecutor(options_, clock_);
-    ASSERT_TRUE(executor.ok()) << executor.status();
-    executor_ = *std::move(executor);
+    executor_ = *MakeLocalExecutor(options_, clock);
   }
 
   /// Makes an executor for two workers, each of which takes over half of the memory.
@@ -60,17 +64,15 @@ class LocalExecutorTest : public ::testing::Test {
         "done; cat \"$here/events\" >&3; sleep 1000");
   }
 
-  void Start(TaskRun& run) { Start(run, digest_); }
-
-  void Start(TaskRun& run, const std::string& digest) {
+  void Start(TaskRun& run, const std::string& digest = Sha256Hex("task")) {
     executor_->Start({.digest = digest,
                       .radiates = radiates_,
                       .request = request_,
                       .way = 0,
                       .write_input =
-                          [](const std::filesystem::path& file) {
+                          [this](const std::filesystem::path& file) {
                             WriteBytes(file, "solid");
-                            return absl::OkStatus();
+                            return input_;
                           },
                       .on_progress =
                           [&run](const v1::Progress& progress) {
@@ -98,18 +100,13 @@ class LocalExecutorTest : public ::testing::Test {
   TemporaryFolder folder_;
   SystemClock clock_;
   bool radiates_ = false;  // whether the tasks that start are transfers
+  absl::Status input_;     // of the tasks that start
   LocalExecutorOptions options_;
   const std::string digest_ = Sha256Hex("task");
   v1::CreateModalModelRequest request_ = *ResolveRequest(SampleRequest(Sha256Hex("solid")));
   TaskRun run_;
   std::unique_ptr<Executor> executor_;
 };
-
-TEST_F(LocalExecutorTest, HandsOverWhatTheWorkerMadeOfTheMesh) {
-  const Outcome outcome = RunScript("tr a-z A-Z <\"$mesh\" >\"$out\"");
-  EXPECT_EQ(outcome.verdict, Verdict::kOk) << outcome.error.message();
-  EXPECT_EQ(run_.model, "SOLID");
-}
 
 TEST_F(LocalExecutorTest, RunsTheWorkerNicedAndNoisyStreamsHarmless) {
   const Outcome outcome =
@@ -122,14 +119,7 @@ TEST_F(LocalExecutorTest, PassesProgressOnAndNeverLetsItGoBack) {
   WriteEvents(ProgressBytes(0.5) + ProgressBytes(0.25) + ProgressBytes(-1) +
               ProgressBytes(std::numeric_limits<double>::quiet_NaN()) + ProgressBytes(7));
   EXPECT_EQ(RunScript("cat \"$here/events\" >&3").verdict, Verdict::kOk);
-  EXPECT_THAT(run_.fractions, ::testing::ElementsAre(0.5, 0.5, 0.5, 0.5, 1));
-}
-
-TEST_F(LocalExecutorTest, TellsARefusalFromOtherEnds) {
-  WriteEvents(ErrorBytes("MESH_NOT_CLOSED"));
-  const Outcome outcome = RunScript("cat \"$here/events\" >&3; exit 2");
-  EXPECT_EQ(outcome.verdict, Verdict::kBadInput);
-  EXPECT_EQ(outcome.error.reason(), "MESH_NOT_CLOSED");
+  EXPECT_THAT(run_.fractions, ElementsAre(0.5, 0.5, 0.5, 0.5, 1));
 }
 
 TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
@@ -140,87 +130,65 @@ TEST_F(LocalExecutorTest, ACrashIsReportedWithTheLastWords) {
   EXPECT_THAT(outcome.error.message(), HasSubstr("segment 7 is   bad"));
 }
 
-/// Checks the outcome of a worker that somebody else has ended.
-void ExpectKilled(const Outcome& outcome, Verdict verdict, const std::string& message) {
-  EXPECT_TRUE(outcome.killed);
-  EXPECT_EQ(outcome.verdict, verdict);
-  EXPECT_THAT(outcome.error.message(), HasSubstr(message));
-}
-
 TEST_F(LocalExecutorTest, AKillIsTheKernelsForLackOfMemoryIfTheKernelSaysSo) {
   options_.kernel_counts = folder_ / "vmstat";
+  worker::v1::WorkerEvent event;
+  event.mutable_progress()->set_node_count(1'000'000);
+  WriteEvents(EventBytes(event));
   WriteBytes(options_.kernel_counts, "pgfault 7\noom_kill 3\nballoon_inflate 0\n");
-  const Outcome outcome = RunScript("echo 'oom_kill 4' >\"$here/vmstat\"; kill -KILL $$");
-  ExpectKilled(outcome, Verdict::kOutOfMemory, "by the system for lack of memory");
+  const Outcome outcome =
+      RunScript("cat \"$here/events\" >&3; echo 'oom_kill 4' >\"$here/vmstat\"; kill -KILL $$");
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
   EXPECT_EQ(outcome.error.reason(), "OUT_OF_MEMORY");
+  EXPECT_THAT(outcome.error.message(), HasSubstr("with its 1000000 nodes it would need about 62"));
 }
 
 TEST_F(LocalExecutorTest, AKillWithoutALackOfMemoryIsSomebodyElses) {
   options_.kernel_counts = folder_ / "vmstat";
   WriteBytes(options_.kernel_counts, "oom_kill 3\n");
   const Outcome outcome = RunScript("kill -KILL $$");
-  ExpectKilled(outcome, Verdict::kCrashed,
-               "signal 9 from outside, and not by the kernel for lack of memory: see who");
+  EXPECT_TRUE(outcome.killed);
+  EXPECT_EQ(outcome.verdict, Verdict::kCrashed);
   EXPECT_EQ(outcome.error.reason(), "WORKER_CRASHED");
 }
 
-TEST_F(LocalExecutorTest, KillsAWorkerThatTakesTooMuchMemory) {
-  options_.memory_limit_bytes = 100 << 20;
-  // Doubled until it is killed.
-  const Outcome outcome = RunScript("x=0123456789abcdef; while :; do x=$x$x; done");
-  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
-  EXPECT_THAT(outcome.error.message(), HasSubstr("100 MiB"));
+TEST_F(LocalExecutorTest, KillsAWorkerThatTakesMoreMemoryThanTheLowerOfTwoLimits) {
+  for (const auto& [option_mib, request_mib, limit] :
+       {std::tuple(100, 0, "100 MiB"), {100, 50, "50 MiB"}, {0, 50, "50 MiB"}}) {
+    SCOPED_TRACE(limit);
+    executor_.reset();  // before what it tells
+    run_ = TaskRun();
+    options_.memory_limit_bytes = option_mib << 20;
+    request_.set_memory_limit_bytes(request_mib << 20);
+    // Doubled until it is killed.
+    const Outcome outcome = RunScript("x=0123456789abcdef; while :; do x=$x$x; done");
+    EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
+    EXPECT_THAT(outcome.error.message(), HasSubstr(limit));
+    EXPECT_GT(outcome.peak_bytes, 50U << 20);
+    EXPECT_FALSE(outcome.crowded);
+  }
 }
 
-TEST_F(LocalExecutorTest, TheRequestsOwnLimitsBindWhereTheyAreLower) {
-  request_.set_memory_limit_bytes(50 << 20);
-  const Outcome outcome = RunScript("x=0123456789abcdef; while :; do x=$x$x; done");
-  EXPECT_EQ(outcome.verdict, Verdict::kOutOfMemory);
-  EXPECT_THAT(outcome.error.message(), HasSubstr("50 MiB"));
-  EXPECT_GT(outcome.peak_bytes, 50U << 20);
-  EXPECT_FALSE(outcome.crowded);
-}
-
-TEST_F(LocalExecutorTest, ALackOfMemoryTellsHowMuchTheMeshWouldNeed) {
-  worker::v1::WorkerEvent event;
-  event.mutable_progress()->set_node_count(1'000'000);
-  WriteEvents(EventBytes(event));
-  options_.kernel_counts = folder_ / "vmstat";
-  WriteBytes(options_.kernel_counts, "oom_kill 0\n");
-  EXPECT_THAT(
-      RunScript("cat \"$here/events\" >&3; echo 'oom_kill 1' >\"$here/vmstat\"; kill -KILL $$")
-          .error.message(),
-      HasSubstr("with its 1000000 nodes it would need about 62"));
-}
-
-TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchTheYoungestMakesRoom) {
-  MakeCrowdedExecutor();
-  Start(run_);
-  ASSERT_TRUE(Happens(run_.progressed));
-  TaskRun second;
-  Start(second, Sha256Hex("second"));
-  ASSERT_TRUE(Happens(second.ended));
-  EXPECT_EQ(second.outcome.verdict, Verdict::kOutOfMemory);
-  EXPECT_TRUE(second.outcome.crowded);
-  executor_->Cancel(digest_);
-  ASSERT_TRUE(Happens(run_.ended));
-  EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
-}
-
-TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchATransferMakesRoomForAYoungerDecomposition) {
-  MakeCrowdedExecutor();
-  radiates_ = true;
-  Start(run_);
-  ASSERT_TRUE(Happens(run_.progressed));
-  radiates_ = false;
-  TaskRun model;
-  Start(model, Sha256Hex("model"));
-  ASSERT_TRUE(Happens(run_.ended));
-  EXPECT_TRUE(run_.outcome.crowded);
-  ASSERT_TRUE(Happens(model.progressed));
-  executor_->Cancel(Sha256Hex("model"));
-  ASSERT_TRUE(Happens(model.ended));
-  EXPECT_EQ(model.outcome.verdict, Verdict::kCancelled);
+TEST_F(LocalExecutorTest, WhereAllTogetherTakeTooMuchATransferMakesRoomAndElseTheYoungest) {
+  for (const bool first_radiates : {false, true}) {
+    TaskRun first, second;
+    MakeCrowdedExecutor();
+    radiates_ = first_radiates;
+    Start(first, digest_);
+    ASSERT_TRUE(Happens(first.progressed));
+    radiates_ = false;
+    Start(second, Sha256Hex("second"));
+    TaskRun& yields = first_radiates ? first : second;
+    ASSERT_TRUE(Happens(yields.ended));
+    EXPECT_EQ(yields.outcome.verdict, Verdict::kOutOfMemory);
+    EXPECT_TRUE(yields.outcome.crowded);
+    executor_->Cancel(first_radiates ? Sha256Hex("second") : digest_);
+    TaskRun& stays = first_radiates ? second : first;
+    ASSERT_TRUE(Happens(stays.ended));
+    EXPECT_EQ(stays.outcome.verdict, Verdict::kCancelled);
+    executor_.reset();  // before what it tells
+  }
 }
 
 TEST_F(LocalExecutorTest, WorkersKeepToTheirShareOfTheProcessors) {
@@ -264,12 +232,10 @@ class MovedClock final : public Clock {
 TEST_F(LocalExecutorTest, AWorkerThatWaitsForAProcessorIsNotStalled) {
   WriteEvents(ProgressBytes(0.5));
   MovedClock clock;
-  options_.program = WriteWorkerScript(
-      folder_.path(),
-      "cat \"$here/events\" >&3; until [ -e \"$here/go\" ]; do :; done; echo sound >\"$out\"");
-  options_.directory = folder_ / "running";
   options_.stall_limit = std::chrono::minutes(10);
-  executor_ = *MakeLocalExecutor(options_, clock);
+  MakeExecutor(
+      "cat \"$here/events\" >&3; until [ -e \"$here/go\" ]; do :; done; echo sound >\"$out\"",
+      clock);
   Start(run_);
   ASSERT_TRUE(Happens(run_.progressed));
   // The worker computes throughout, but an hour passes in which it gets no more than a second.
@@ -296,27 +262,9 @@ TEST_F(LocalExecutorTest, KillsAWorkerThatLivesButNeverEnds) {
             Verdict::kTimeout);
 }
 
-TEST_F(LocalExecutorTest, CancelsARunningWorker) {
-  WriteEvents(ProgressBytes(0.5));
-  MakeExecutor("cat \"$here/events\" >&3; sleep 1000");
-  Start(run_);
-  ASSERT_TRUE(Happens(run_.progressed));
-  executor_->Cancel(digest_);
-  ASSERT_TRUE(Happens(run_.ended));
-  EXPECT_EQ(run_.outcome.verdict, Verdict::kCancelled);
-}
-
 TEST_F(LocalExecutorTest, AMeshThatCannotBeBroughtEndsTheTask) {
-  MakeExecutor("true");
-  std::promise<Outcome> ended;
-  executor_->Start(
-      {.digest = digest_,
-       .request = {},
-       .way = 0,
-       .write_input = [](const auto&) { return absl::DataLossError("DATABASE_CORRUPT: x"); },
-       .on_progress = [](const v1::Progress&) {},
-       .on_end = [&](const Outcome& outcome) { ended.set_value(outcome); }});
-  EXPECT_EQ(ended.get_future().get().error.reason(), "DATABASE_CORRUPT");
+  input_ = absl::DataLossError("DATABASE_CORRUPT: x");
+  EXPECT_EQ(RunScript("true").error.reason(), "DATABASE_CORRUPT");
 }
 
 TEST_F(LocalExecutorTest, ItsDestructionKillsWhatRunsWithoutAWord) {
@@ -343,6 +291,43 @@ TEST_F(LocalExecutorTest, WorkersDieWithTheDaemonHoweverItDies) {
   kill(daemon, SIGKILL);
   ASSERT_EQ(waitpid(daemon, nullptr, 0), daemon);
   EXPECT_TRUE(life.LosesItsWriters());
+}
+
+TEST(WorkerEvents, AreTheSameHoweverTheBytesAreCut) {
+  const std::string bytes =
+      ProgressBytes(0.25) + ProgressBytes(0.5) + ErrorBytes("MESH_NOT_CLOSED");
+  for (size_t piece = 1; piece <= bytes.size(); ++piece) {
+    WorkerEventReader reader;
+    std::vector<double> fractions;
+    std::vector<std::string> reasons;
+    for (size_t at = 0; at < bytes.size(); at += piece) {
+      ASSERT_TRUE(reader
+                      .Feed(std::string_view(bytes).substr(at, piece),
+                            [&](const worker::v1::WorkerEvent& event) {
+                              if (event.has_error()) reasons.push_back(event.error().reason());
+                              if (event.has_progress()) {
+                                fractions.push_back(event.progress().fraction());
+                              }
+                            })
+                      .ok());
+    }
+    EXPECT_THAT(fractions, ElementsAre(0.25, 0.5));
+    EXPECT_THAT(reasons, ElementsAre("MESH_NOT_CLOSED"));
+  }
+}
+
+TEST(WorkerEvents, RefusesGarbageWithoutKeepingIt) {
+  const std::vector<std::string> garbage = {
+      std::string(6, '\xff'),              // a length of no end
+      std::string("\x80\x80\x80\x01", 4),  // a length of 2 MiB
+      std::string(1, '\0'),                // an event that says nothing
+      "\004text",                          // no protobuf
+      "\x05\x12\x03\x0a\x01\xff",          // a reason that is no UTF-8
+  };
+  for (const std::string& bytes : garbage) {
+    WorkerEventReader reader;
+    EXPECT_TRUE(absl::IsDataLoss(reader.Feed(bytes, [](const worker::v1::WorkerEvent&) {})));
+  }
 }
 
 }  // namespace

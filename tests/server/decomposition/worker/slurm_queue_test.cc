@@ -3,27 +3,28 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
 namespace carillon {
 namespace {
 
-SlurmState StateOf(const std::string& word) {
-  return ParseSqueue("name|ticket|" + word + "\n").at({"name", "ticket"});
-}
-
 TEST(SlurmQueue, TellsWhatHasHopeFromWhatHasNone) {
-  EXPECT_EQ(StateOf("PENDING"), SlurmState::kWaitsOrRuns);
-  EXPECT_EQ(StateOf("COMPLETING"), SlurmState::kWaitsOrRuns);
-  EXPECT_EQ(StateOf("OUT_OF_MEMORY"), SlurmState::kOutOfMemory);
-  EXPECT_EQ(StateOf("TIMEOUT"), SlurmState::kTimeout);
-  EXPECT_EQ(StateOf("CANCELLED by 0"), SlurmState::kCancelled);
-  EXPECT_EQ(StateOf("NODE_FAIL"), SlurmState::kLost);
-  EXPECT_EQ(StateOf("A_STATE_OF_THE_FUTURE"), SlurmState::kLost);
-}
-
-TEST(SlurmQueue, AJobThatItsNodeRefusedIsStuckButOneThatPeopleHoldWaits) {
-  EXPECT_EQ(StateOf("PENDING|launch failed requeued held"), SlurmState::kStuck);
-  EXPECT_EQ(StateOf("PENDING|JobHeldUser"), SlurmState::kWaitsOrRuns);
-  EXPECT_EQ(StateOf("RUNNING|None"), SlurmState::kWaitsOrRuns);
+  for (const auto& [word, state] :
+       {std::pair("PENDING", SlurmState::kWaitsOrRuns),
+        {"COMPLETING", SlurmState::kWaitsOrRuns},
+        {"RUNNING|None", SlurmState::kWaitsOrRuns},
+        {"PENDING|JobHeldUser", SlurmState::kWaitsOrRuns},            // held by people
+        {"PENDING|launch failed requeued held", SlurmState::kStuck},  // refused by its node
+        {"OUT_OF_MEMORY", SlurmState::kOutOfMemory},
+        {"TIMEOUT", SlurmState::kTimeout},
+        {"CANCELLED by 0", SlurmState::kCancelled},
+        {"NODE_FAIL", SlurmState::kLost},
+        {"A_STATE_OF_THE_FUTURE", SlurmState::kLost}}) {
+    EXPECT_EQ(ParseSqueue(absl::StrCat("name|ticket|", word, "\n")).at({"name", "ticket"}), state)
+        << word;
+  }
 }
 
 TEST(SlurmQueue, OfSeveralJobsOfOneTicketTheMostHopefulCounts) {
