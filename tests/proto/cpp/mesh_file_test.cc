@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
@@ -19,17 +20,10 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class MeshFile : public testing::Test {
- public:
-  MeshFile()
-      : folder_(std::filesystem::path(testing::TempDir()) /
-                testing::UnitTest::GetInstance()->current_test_info()->name()) {
-    std::filesystem::create_directories(folder_ / "data");
-  }
-  ~MeshFile() override { std::filesystem::remove_all(folder_); }
-  MeshFile(const MeshFile&) = delete;
-  MeshFile& operator=(const MeshFile&) = delete;
-
  protected:
+  MeshFile() { std::filesystem::create_directories(folder_ / "data"); }
+  ~MeshFile() override { std::filesystem::remove_all(folder_); }
+
   std::string Write(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return (folder_ / name).string();
@@ -45,7 +39,9 @@ class MeshFile : public testing::Test {
                         uri, R"("}]})");
   }
 
-  std::filesystem::path folder_;
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) /
+      testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
 constexpr char kAbc[] = "data:application/octet-stream;base64,YWJj";
@@ -54,6 +50,8 @@ TEST_F(MeshFile, AGltfComesWithTheDataOfItsBuffers) {
   Write("data/of body.bin", "abc");
   const std::string bytes = ReadGltf(Gltf("data/of%20body.bin"));
   EXPECT_THAT(bytes, AllOf(HasSubstr(kAbc), HasSubstr("byteLength"), HasSubstr("2.0")));
+  EXPECT_THAT(ReadGltf("\xEF\xBB\xBF" + Gltf("data/of%20body.bin")), HasSubstr(kAbc))
+      << "with a byte order mark";
 }
 
 TEST_F(MeshFile, AGltfWithAllDataAndATextThatIsNoneStayAsTheyAre) {
@@ -84,11 +82,6 @@ TEST_F(MeshFile, OnlyAFileNamedGltfBringsOthers) {
   EXPECT_EQ(*ReadMeshFile(Write("body.gltf", document), "obj"), document);
 }
 
-TEST_F(MeshFile, AByteOrderMarkDoesNotHideTheBuffersOfAGltf) {
-  Write("body.bin", "abc");
-  EXPECT_THAT(ReadGltf("\xEF\xBB\xBF" + Gltf("body.bin")), HasSubstr(kAbc));
-}
-
 TEST_F(MeshFile, AnInputOfAbaqusComesWithTheFilesThatItIncludes) {
   Write("data/corners.inc", "1, 0, 0, 0\n*Include, input=\"data/more.inc\"\n");
   Write("data/more.inc", "2, 1, 0, 0");
@@ -112,19 +105,16 @@ TEST_F(MeshFile, AnIncludedFileMustBeThereInTheFolderAndNotIncludeItself) {
               AllOf(HasSubstr("MESH_UNREADABLE: "), HasSubstr("without an end")));
 }
 
-TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOne) {
-  Write("body.node", "nodes");
-  const std::string elements = Write("body.ele", "elements\n");
-  EXPECT_EQ(*ReadMeshFile(elements, "node"), "nodes\nelements\n");
-  std::filesystem::remove(elements);
-  EXPECT_EQ(*ReadMeshFile((folder_ / "body.node").string(), "node"), "nodes");
-}
-
-TEST_F(MeshFile, TheTwoFilesOfTetgenMayHaveNamesInCapitals) {
-  Write("BODY.ELE", "elements\n");
-  const std::string nodes = Write("BODY.NODE", "nodes");
-  EXPECT_EQ(*ReadMeshFile(nodes, "node"), "nodes\nelements\n");
-  EXPECT_EQ(*ReadMeshFile((folder_ / "BODY.ELE").string(), "node"), "nodes\nelements\n");
+TEST_F(MeshFile, TheTwoFilesOfTetgenBecomeOneAlsoIfTheirNamesAreInCapitals) {
+  for (const auto& [first, second] :
+       {std::pair("body.node", "body.ele"), {"BODY.NODE", "BODY.ELE"}}) {
+    const std::string nodes = Write(first, "nodes");
+    const std::string elements = Write(second, "elements\n");
+    EXPECT_EQ(*ReadMeshFile(nodes, "node"), "nodes\nelements\n");
+    EXPECT_EQ(*ReadMeshFile(elements, "node"), "nodes\nelements\n");
+    std::filesystem::remove(elements);
+    EXPECT_EQ(*ReadMeshFile(nodes, "node"), "nodes");
+  }
 }
 
 TEST_F(MeshFile, WhatIsNoFileOrEmptyIsRefused) {

@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "proto/cpp/program/escaped_text.h"
+
 namespace carillon {
 namespace {
 
@@ -35,6 +40,19 @@ TEST(Quantity, ALengthIsANumberWithAUnitOrOfMetres) {
   for (const char* text : {"", "mm", "0mm", "-3mm", "3 mm", "3ell", "nan"}) {
     EXPECT_FALSE(ParseLengthM(text)) << text;
   }
+}
+
+TEST(QuotedText, BytesThatATerminalWouldObeyOrThatAreNoUtf8AreWrittenInHexadecimal) {
+  EXPECT_EQ(QuotedText("T\xC3\xBCr"), "\"T\xC3\xBCr\"");
+  EXPECT_EQ(QuotedText("caf\xe9\x1b[2J"), "\"caf\\xe9\\x1b[2J\"");
+}
+
+TEST(QuotedText, LongTextsAreCutBetweenCharacters) {
+  EXPECT_EQ(QuotedText(std::string(100'000, 'x')),
+            absl::StrCat("\"", std::string(60, 'x'), "...\""));
+  // The character of two bytes would end at byte 61.
+  EXPECT_EQ(QuotedText(absl::StrCat(std::string(59, 'x'), "\xC3\xBC")),
+            absl::StrCat("\"", std::string(59, 'x'), "...\""));
 }
 
 }  // namespace

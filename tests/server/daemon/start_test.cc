@@ -1,18 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "server/daemon/journal_fields.h"
-
+//
+// Where the daemon keeps its data, and whether and how it writes to the journal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
-#include <string>
+#include <latch>
+#include <optional>
+#include <thread>
+
+#include "server/daemon/data_directory.h"
+#include "server/daemon/journal_fields.h"
+#include "tests/server/mode_database/sample_model.h"
 
 namespace carillon {
 namespace {
 
 using testing::ElementsAre;
+
+TEST(DataDirectory, IsMadeForItsOwnerOnly) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(DataDirectory::Open(folder / "a/b").ok());
+  EXPECT_EQ(std::filesystem::status(folder / "a/b").permissions(),
+            std::filesystem::perms::owner_all);
+}
+
+TEST(DataDirectory, WaitsForOneThatIsBeingGivenUp) {
+  const TemporaryFolder folder;
+  // In most rounds the other thread tries while the first still has the folder.
+  for (int round = 0; round < 20; ++round) {
+    std::optional<absl::StatusOr<DataDirectory>> first = DataDirectory::Open(folder / "data");
+    ASSERT_TRUE(first->ok());
+    std::latch begun(1);
+    std::thread other([&] {
+      begun.count_down();
+      EXPECT_TRUE(DataDirectory::Open(folder / "data").ok());
+    });
+    begun.wait();
+    std::this_thread::yield();
+    first.reset();
+    other.join();
+  }
+}
 
 TEST(JournalFields, AnEventHasItsLineItsLevelItsNameAndItsFields) {
   const Event event =
