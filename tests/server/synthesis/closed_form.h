@@ -14,6 +14,7 @@
 #include "server/synthesis/bank/oscillator_bank.h"
 #include "server/synthesis/bank/sounding_modes.h"
 #include "server/synthesis/mixer.h"
+#include "tests/server/synthesis/sound.h"
 
 namespace carillon {
 
@@ -71,6 +72,16 @@ inline double SumOfModes(const SoundingModes& sounding, double g, double time_s,
   return sum;
 }
 
+/// The sound of unit strikes at these frames, in frame n.
+inline double SumOfStrikes(const SoundingModes& sounding, const std::vector<double>& strikes,
+                           size_t n) {
+  double sum = 0;
+  for (const double strike : strikes) {
+    sum += SumOfModes(sounding, 1, (static_cast<double>(n) - strike) * kTestFrameS);
+  }
+  return sum;
+}
+
 /// Largest deviation from right(n) over its largest value, decibels, of every `stride`-th sample
 /// from `first` on.
 template <class Right>
@@ -90,6 +101,13 @@ inline double ErrorDb(const std::vector<float>& sound, const SoundingModes& soun
   return DeviationDb(sound, 0, sound.size() > 10000 ? 13 : 1, [&](size_t n) {
     return SumOfModes(sounding, g, (static_cast<double>(n) - strike_frame) * kTestFrameS, tau_s);
   });
+}
+
+/// The same of unit strikes at these frames.
+inline double StrikesErrorDb(std::span<const float> sound, size_t first, size_t stride,
+                             const SoundingModes& sounding, const std::vector<double>& strikes) {
+  return DeviationDb(sound, first, stride,
+                     [&](size_t n) { return SumOfStrikes(sounding, strikes, n); });
 }
 
 /// Modes over the whole band and all kinds of decay; more than a vector of them, not a multiple.
@@ -117,6 +135,15 @@ class TestMix {
     bank.RenderAdd(mix_);
     Finish(block);
   }
+  /// Further blocks of 128 frames, of which it returns the last.
+  std::vector<float> RenderOn(OscillatorBank& bank, size_t block_count) {
+    std::vector<float> block(128);
+    for (size_t i = 0; i < block_count; ++i) {
+      Begin();
+      Render(bank, block);
+    }
+    return block;
+  }
 
  private:
   RenderWorkspace workspace_;
@@ -124,26 +151,28 @@ class TestMix {
   uint64_t block_number_ = 0;
 };
 
-/// Renders a bank by itself, without mixer or limiter.
-inline std::vector<float> Ring(OscillatorBank& bank, const SurfaceImpulse& impulse,
-                               size_t frame_count, size_t offset = 0, float lead_frames = 0,
-                               size_t block_frame_count = 128, size_t stagger = 0) {
-  std::vector<float> sound(frame_count / block_frame_count * block_frame_count);
+/// Renders a bank by itself, without mixer or limiter. `at_block(number, mix)` comes before each
+/// block.
+template <class AtBlock>
+std::vector<float> RenderBlocks(OscillatorBank& bank, size_t block_count, const AtBlock& at_block,
+                                size_t block_frame_count = 128, size_t stagger = 0) {
+  std::vector<float> sound(block_count * block_frame_count);
   TestMix test(block_frame_count, stagger);
-  for (size_t start = 0; start < sound.size(); start += block_frame_count) {
-    BlockMix& mix = test.Begin();
-    if (start == 0) bank.Strike(impulse, offset, lead_frames, mix);
-    bank.RenderAdd(mix);
-    test.Finish(std::span(sound).subspan(start, block_frame_count));
+  for (size_t block = 0; block < block_count; ++block) {
+    at_block(block, test.Begin());
+    test.Render(bank, std::span(sound).subspan(block * block_frame_count, block_frame_count));
   }
   return sound;
 }
 
-/// Root of the mean square.
-inline double Rms(std::span<const float> sound) {
-  double sum = 0;
-  for (const float x : sound) sum += double{x} * x;
-  return std::sqrt(sum / static_cast<double>(sound.size()));
+/// The same after one impulse.
+inline std::vector<float> Ring(OscillatorBank& bank, const SurfaceImpulse& impulse,
+                               size_t frame_count, size_t offset = 0, float lead_frames = 0,
+                               size_t block_frame_count = 128, size_t stagger = 0) {
+  const auto strike = [&](size_t block, BlockMix& mix) {
+    if (block == 0) bank.Strike(impulse, offset, lead_frames, mix);
+  };
+  return RenderBlocks(bank, frame_count / block_frame_count, strike, block_frame_count, stagger);
 }
 
 }  // namespace carillon

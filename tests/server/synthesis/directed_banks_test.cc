@@ -8,11 +8,11 @@
 #include <complex>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "server/synthesis/mixer.h"
-#include "tests/server/synthesis/closed_form.h"
+#include "tests/server/synthesis/struck_bank.h"
 
 namespace carillon {
 namespace {
@@ -105,7 +105,8 @@ class Scene {
   struct Setting {
     std::vector<double> frequencies_hz{440};
     double sigma = kStill;
-    Patterns patterns{};  ///< empty: no directivity
+    Patterns patterns{};          ///< empty: no directivity
+    std::vector<float> shapes{};  ///< empty: all modes move alike
     double radius_m = 0.01;
     Vector listener_m{0, 0, 1};
     bool near_field = false;
@@ -122,12 +123,10 @@ class Scene {
                               .near_field = setting.near_field};
     }
     const size_t count = setting.frequencies_hz.size();
-    bank_ = mixer_
-                .Add(std::make_unique<OscillatorBank>(
-                         SoundingModes{.modes = ModesAt(setting.frequencies_hz, setting.sigma)},
-                         MakeUniformShapes(count), settings),
-                     voice_)
-                .value();
+    const SoundingModes modes{.modes = ModesAt(setting.frequencies_hz, setting.sigma)};
+    const ShapeTable shapes =
+        setting.shapes.empty() ? MakeUniformShapes(count) : MakeShapes(setting.shapes, count);
+    bank_ = mixer_.Add(std::make_unique<OscillatorBank>(modes, shapes, settings), voice_).value();
   }
 
   void Send(uint64_t frame, const MixerEvent::Action& action, float fraction = 0) {
@@ -137,9 +136,7 @@ class Scene {
   void Strike(uint64_t frame, float fraction = 0) { Send(frame, MakeUnitImpulse(), fraction); }
 
   std::vector<float> Render(size_t block_count) {
-    std::vector<float> frames(block_count * 128);
-    mixer_.Render(frames);
-    return frames;
+    return carillon::Render(mixer_, block_count, block_count);
   }
 
  private:
@@ -165,12 +162,9 @@ std::vector<float> StrikeOnce(const Scene::Setting& setting) {
   return scene.Render(432);
 }
 
-Vector Direction(double theta, double phi) {
-  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
-}
-
-Vector At(double distance_m, const Vector& direction) {
-  return {distance_m * direction[0], distance_m * direction[1], distance_m * direction[2]};
+Vector Direction(double theta, double phi, double distance_m = 1) {
+  return {distance_m * std::sin(theta) * std::cos(phi),
+          distance_m * std::sin(theta) * std::sin(phi), distance_m * std::cos(theta)};
 }
 
 // One mode in each kind of tile: a dipole, a fork-like quadrupole, and one of many harmonics.
@@ -186,7 +180,7 @@ TEST(DirectedBanks, EachModeIsHeardAsTheSoundFieldIsNearAndFar) {
   for (const double distance_m : {0.05, 0.4, 20.0}) {
     for (const auto& [theta, phi] :
          {std::pair{0.3, 0.2}, {1.2, 2.5}, {2.6, -1.1}, {1.5707, -2.9}}) {
-      setting.listener_m = At(distance_m, Direction(theta, phi));
+      setting.listener_m = Direction(theta, phi, distance_m);
       setting.patterns = {};
       const std::vector<float> plain = StrikeOnce(setting);
       setting.patterns = kPatterns;
@@ -206,18 +200,18 @@ TEST(DirectedBanks, EachModeIsHeardAsTheSoundFieldIsNearAndFar) {
 
 TEST(DirectedBanks, WithoutNearFieldThePatternIsTheFarOneAtAnyDistance) {
   Scene::Setting setting{.frequencies_hz = kFrequenciesHz, .patterns = kPatterns};
-  setting.listener_m = At(0.05, Direction(1, 2));
+  setting.listener_m = Direction(1, 2, 0.05);
   const std::vector<float> near = StrikeOnce(setting);
-  setting.listener_m = At(1000, Direction(1, 2));
+  setting.listener_m = Direction(1, 2, 1000);
   EXPECT_EQ(near, StrikeOnce(setting));
 }
 
 TEST(DirectedBanks, InsideTheEnclosingSphereTheSoundIsThatOnTheSphere) {
   Scene::Setting setting{
       .frequencies_hz = kFrequenciesHz, .patterns = kPatterns, .radius_m = 0.2, .near_field = true};
-  setting.listener_m = At(0.2, Direction(1, 2));
+  setting.listener_m = Direction(1, 2, 0.2);
   const std::vector<float> on = StrikeOnce(setting);
-  setting.listener_m = At(0.02, Direction(1, 2));
+  setting.listener_m = Direction(1, 2, 0.02);
   const std::vector<float> inside = StrikeOnce(setting);
   for (const double hz : kFrequenciesHz) {
     EXPECT_NEAR(std::abs(Amplitude(inside, hz) / Amplitude(on, hz)), 1, 1e-5);
@@ -249,13 +243,8 @@ TEST(DirectedBanks, ModesThatRadiateEquallySoundAsWithoutDirectivityWhateverHapp
   const std::vector<Harmonic> round = {{0, 0, {0, 1}}, {1, 0, {}}};
   const std::vector<float> plain = RenderBusy({});
   const std::vector<float> directed = RenderBusy({round, round, round});
-  double peak = 0, difference = 0;
-  for (size_t n = 0; n < plain.size(); ++n) {
-    peak = std::max(peak, std::abs(double{plain[n]}));
-    difference = std::max(difference, std::abs(double{plain[n]} - double{directed[n]}));
-  }
-  EXPECT_GT(peak, 0.001);
-  EXPECT_LT(difference, 2e-6 * peak);
+  EXPECT_GT(Peak(plain), 0.001);
+  EXPECT_LT(LargestDifference(plain, directed), 2e-6 * Peak(plain));
 }
 
 /// The largest error, relative to the largest sample, of predicting each sample of a decaying sine
@@ -307,14 +296,9 @@ TEST(DirectedBanks, ATurningObjectSoundsAsIfTheListenerWalkedRoundTheOtherWay) {
   const std::vector<float> turned = turning.Render(760), walked = walking.Render(760);
   // The greatest step is at -90 dB; rounding moves it by some hundredths.
   EXPECT_LT(Suddenness(turned, 6000, kStill), -89.9);
-  double peak = 0, difference = 0;
-  for (size_t n = 0; n < turned.size(); ++n) {
-    peak = std::max(peak, std::abs(double{turned[n]}));
-    difference = std::max(difference, std::abs(double{turned[n]} - double{walked[n]}));
-  }
   // Between two poses the listener walks along the chord of the circle.
-  EXPECT_LT(difference, 2e-3 * peak);
-  EXPECT_GT(peak, 1e-5);
+  EXPECT_LT(LargestDifference(turned, walked), 2e-3 * Peak(turned));
+  EXPECT_GT(Peak(turned), 1e-5);
 }
 
 TEST(DirectedBanks, AJumpIsACrossFadeOfTenMilliseconds) {
@@ -337,22 +321,12 @@ std::vector<double> LevelsAround(std::array<float, 2> impulses) {
   }
   std::vector<double> levels;
   for (int i = 0; i < 16; ++i) {
-    Mixer mixer;
-    const auto voice =
-        std::make_shared<Voice>(Voice::Settings{.hearing = {.directivity = true}}, Place{},
-                                Place{.position_m = Direction(kPi / 2, i * kPi / 8)});
-    const BankId bank =
-        mixer
-            .Add(std::make_unique<OscillatorBank>(
-                     SoundingModes{.modes = ModesAt({1500, 1500}, kStill)}, MakeShapes(shapes, 2),
-                     OscillatorBankSettings{
-                         .directivity = {{.directivity = MakeDirectivity(pair, 0.01)}}}),
-                 voice)
-            .value();
-    mixer.OpenStream().value()->TryPush({.bank = bank, .action = MakeUnitImpulse()});
-    std::vector<float> frames(size_t{432} * 128);
-    mixer.Render(frames);
-    levels.push_back(std::abs(Amplitude(frames, 1500)));
+    Scene scene({.frequencies_hz = {1500, 1500},
+                 .patterns = pair,
+                 .shapes = shapes,
+                 .listener_m = Direction(kPi / 2, i * kPi / 8)});
+    scene.Strike(0);
+    levels.push_back(std::abs(Amplitude(scene.Render(432), 1500)));
   }
   return levels;
 }
@@ -376,13 +350,11 @@ TEST(DirectedBanks, AStrikeBeginsWithoutAJumpWhateverThePhaseOfItsGain) {
     Scene scene({.patterns = {{{1, 0, std::polar(1.0, phase)}}}});
     scene.Strike(100);
     const std::vector<float> frames = scene.Render(20);
-    double steepest = 0, peak = 0;
-    for (size_t n = 1; n < frames.size(); ++n) {
-      steepest = std::max(steepest, std::abs(double{frames[n]} - double{frames[n - 1]}));
-      peak = std::max(peak, std::abs(double{frames[n]}));
-    }
+    const std::span<const float> all(frames);
+    const double steepest = LargestDifference(all.first(frames.size() - 1), all.subspan(1));
     // A sine, and a cosine with its companion, begin with this slope each.
-    EXPECT_LT(steepest, 1.05 * std::numbers::sqrt2 * 2 * kPi * 440 * kTestFrameS * peak) << phase;
+    EXPECT_LT(steepest, 1.05 * std::numbers::sqrt2 * 2 * kPi * 440 * kTestFrameS * Peak(frames))
+        << phase;
   }
 }
 
@@ -391,8 +363,7 @@ TEST(DirectedBanks, AStrikeAndAMoveInOneBlockOfSilenceAreHeardFromTheNewPlace) {
   Scene there({.frequencies_hz = {6000}, .patterns = kOctupole, .listener_m = {0.6, 0.8, 0}});
   moved.Send(30, ListenerMove{{.position_m = {0.6F, 0.8F, 0}}});
   for (Scene* scene : {&moved, &there}) scene->Strike(30);
-  const std::vector<float> after = moved.Render(20), right = there.Render(20);
-  for (size_t n = 0; n < right.size(); ++n) EXPECT_NEAR(after[n], right[n], 1e-6) << n;
+  EXPECT_LT(LargestDifference(moved.Render(20), there.Render(20)), 1e-6);
 }
 
 }  // namespace

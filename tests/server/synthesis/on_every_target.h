@@ -22,4 +22,8 @@ class OnEveryTarget : public testing::TestWithParam<int64_t> {
   }
 };
 
+INSTANTIATE_TEST_SUITE_P(Targets, OnEveryTarget,
+                         testing::ValuesIn(hwy::SupportedAndGeneratedTargets()),
+                         [](const auto& target) { return hwy::TargetName(target.param); });
+
 }  // namespace carillon

@@ -3,39 +3,28 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "server/synthesis/bank/level.h"
+#include "tests/server/synthesis/bank/struck_ball.h"
+#include "tests/server/synthesis/sound.h"
 
 namespace carillon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kRate = 48000;
-constexpr double kAirDensity = 1.204;
-constexpr double kSoundSpeed = 343;
+constexpr double kMassKg = kBallDensity * kBallM3;
 constexpr size_t kBlock = 128;
 constexpr size_t kFrames = 8 * kBlock;
 
-const std::array<std::array<float, 3>, 3> kVertices = {
-    std::array<float, 3>{0.05F, 0, 0}, {0, 0.05F, 0}, {0, 0, 0.05F}};
-
-/// A wooden ball whose rotation about z moves air as a quadrupole xy, as if it had a bump.
+/// A ball whose rotation about z moves air as a quadrupole xy, as if it had a bump.
 MovedBody Ball(double size = 1) {
-  constexpr double kRadius = 0.05;
-  MovedBody moved{.body = {}, .density_kg_per_m3 = 700, .size = size, .vertices = kVertices};
-  moved.body.volume_m3 = 4 * kPi / 3 * std::pow(kRadius, 3);
-  const double moment = 0.4 * moved.body.volume_m3 * kRadius * kRadius;
-  moved.body.inertia_kg_m2 = {moment, moment, moment, 0, 0, 0};
-  for (RigidRadiation::Motion& motion : moved.body.motions) motion.radius_m = kRadius;
-  const double n_in_harmonics = std::sqrt(4 * kPi / 3);
-  moved.body.motions[0].strengths[3] = n_in_harmonics;
-  moved.body.motions[1].strengths[1] = n_in_harmonics;
-  moved.body.motions[2].strengths[2] = n_in_harmonics;
+  MovedBody moved = MakeBall(size);
   moved.body.motions[5].strengths[4] = 0.02;
   return moved;
 }
@@ -75,54 +64,17 @@ std::vector<float> Sound(const Blow& blow, const Bearing* bearing, const MovedBo
   return Render(noise);
 }
 
-double Energy(const std::vector<float>& sound) {
-  double sum = 0;
-  for (const float sample : sound) sum += double{sample} * sample;
-  return sum;
-}
-
-double Difference(const std::vector<float>& a, const std::vector<float>& b) {
-  double most = 0;
-  for (size_t n = 0; n < a.size(); ++n) most = std::max(most, std::abs(double{a[n]} - b[n]));
-  return most;
-}
-
-double Peak(const std::vector<float>& sound) {
-  return Difference(sound, std::vector<float>(sound.size()));
-}
-
-/// y'' = -2 b y' - 2 b^2 y + b f', integrated in small steps: what a translating sphere sounds like
-/// (the field equation of transfer.proto as a differential equation). With y' = v + b f.
-std::vector<float> Integrated(double duration_s, double amplitude) {
-  constexpr int kSteps = 400;
-  const double b = kSoundSpeed / 0.05, dt = 1 / (kRate * kSteps);
-  const auto force = [&](double t) {
-    return t > 0 && t < duration_s ? (1 - std::cos(2 * kPi * t / duration_s)) / duration_s : 0;
-  };
-  std::vector<float> sound;
-  double y = 0, v = 0, t = 0;
-  for (size_t n = 0; n < kFrames; ++n) {
-    sound.push_back(static_cast<float>(amplitude * y));
-    for (int i = 0; i < kSteps; ++i, t += dt) {
-      const double f = force(t + dt / 2);
-      // The rule of the middle point.
-      const double y_middle = y + dt / 2 * (v + b * f);
-      const double v_middle = v + dt / 2 * (-2 * b * (v + b * f) - 2 * b * b * y);
-      y += dt * (v_middle + b * f);
-      v += dt * (-2 * b * (v_middle + b * f) - 2 * b * b * y_middle);
-    }
-  }
-  return sound;
-}
-
 constexpr Bearing kFromAbove{.direction = {0, 0, 1}, .distance_m = 1};
 
 TEST(AccelerationNoise, OfATranslatingSphereFollowsItsDifferentialEquation) {
-  const double mass = 700 * Ball().body.volume_m3;
   for (const double duration_s : {1e-4, 5e-4, 4e-3}) {
     const auto sound = Sound({.duration_s = duration_s}, &kFromAbove);
-    const auto expected = Integrated(duration_s, -0.1 * kAirDensity * 0.05 * 0.05 / mass);
-    EXPECT_LT(Difference(sound, expected), 1e-3 * Peak(expected)) << duration_s;
+    const double amplitude = -0.1 * kBallAirDensity * kBallRadiusM * kBallRadiusM / kMassKg;
+    const auto expected = IntegrateBall(kRate, kFrames, amplitude, [duration_s](double t) {
+      return t < duration_s ? (1 - std::cos(2 * kPi * t / duration_s)) / duration_s : 0;
+    });
+    const std::vector<double> heard(sound.begin(), sound.end());
+    EXPECT_LT(LargestDifference(heard, expected), 1e-3 * Peak(expected)) << duration_s;
   }
 }
 
@@ -131,9 +83,8 @@ TEST(AccelerationNoise, OfATranslatingSphereFollowsItsDifferentialEquation) {
 TEST(AccelerationNoise, OfASlowBlowIsThatOfADipoleOfAnySize) {
   constexpr double kDuration = 0.01;
   const double steepest = 2 * kPi / (kDuration * kDuration);
-  const double mass = 700 * Ball().body.volume_m3;
-  const double expected =
-      0.1 * kAirDensity * std::pow(0.05, 3) / (2 * kSoundSpeed) * steepest / mass;
+  const double expected = 0.1 * kBallAirDensity * std::pow(kBallRadiusM, 3) /
+                          (2 * kBallSoundSpeed) * steepest / kMassKg;
   for (const double size : {0.5, 1.0}) {
     const auto sound = Sound({.duration_s = kDuration}, &kFromAbove, Ball(size));
     EXPECT_NEAR(Peak(sound), expected, 0.03 * expected) << size;
@@ -153,16 +104,10 @@ TEST(AccelerationNoise, WithoutDirectionsHasTheirMeanPower) {
     for (size_t axis = 0; axis < 3; ++axis) {
       Bearing bearing{.direction = {0, 0, 0}, .distance_m = 1};
       bearing.direction[axis] = sign;
-      sum += Energy(Sound(blow, &bearing, [] {
-        MovedBody ball = Ball();
-        ball.body.motions[5].strengths = {};
-        return ball;
-      }()));
+      sum += Energy(Sound(blow, &bearing, MakeBall()));
     }
   }
-  MovedBody ball = Ball();
-  ball.body.motions[5].strengths = {};
-  EXPECT_NEAR(Energy(Sound(blow, nullptr, ball)), sum / 6, 1e-4 * sum);
+  EXPECT_NEAR(Energy(Sound(blow, nullptr, MakeBall())), sum / 6, 1e-4 * sum);
 }
 
 // The impulse acts along y at x = 0.05 m: about z. Seen along y = x, where the quadrupole is
@@ -172,25 +117,21 @@ TEST(AccelerationNoise, OfABlowBesideTheCentreHasTheRotationToo) {
   const Bearing diagonal{.direction = {half, half, 0}, .distance_m = 1};
   const Bearing other{.direction = {-half, half, 0}, .distance_m = 1};
   const Blow through{.vertex = 1, .impulse = {0, 1, 0}}, beside{.vertex = 0, .impulse = {0, 1, 0}};
-  EXPECT_LT(Difference(Sound(through, &diagonal), Sound(through, &other)), 1e-9);
+  EXPECT_LT(LargestDifference(Sound(through, &diagonal), Sound(through, &other)), 1e-9);
   // The quadrupole has the other sign on the other diagonal: half the difference is its sound.
-  EXPECT_GT(Difference(Sound(beside, &diagonal), Sound(beside, &other)),
+  EXPECT_GT(LargestDifference(Sound(beside, &diagonal), Sound(beside, &other)),
             0.1 * Peak(Sound(beside, &diagonal)));
 }
 
-TEST(AccelerationNoise, DoesNotDependOnWhereABlockBegins) {
-  const auto sound = Sound({}, nullptr);
-  const auto later = Sound({.offset = 120}, nullptr);
+TEST(AccelerationNoise, DoesNotDependOnWhereInABlockOrAFrameItBegins) {
+  const auto sound = Sound({}, nullptr), later = Sound({.offset = 120}, nullptr);
   const std::vector<float> head(sound.begin(), sound.end() - 120);
   const std::vector<float> tail(later.begin() + 120, later.end());
-  EXPECT_LT(Difference(head, tail), 1e-6 * Peak(sound));
-}
-
-TEST(AccelerationNoise, KnowsThePartOfAFrameBeforeItsFirstSample) {
+  EXPECT_LT(LargestDifference(head, tail), 1e-6 * Peak(sound));
   // With 1 frame of lead the sound is that of a blow one frame earlier.
   const auto early = Sound({.offset = 9}, nullptr);
   const auto lead = Sound({.offset = 10, .lead_frames = 1}, nullptr);
-  EXPECT_LT(Difference(early, lead), 1e-6 * Peak(early));
+  EXPECT_LT(LargestDifference(early, lead), 1e-6 * Peak(early));
 }
 
 TEST(AccelerationNoise, BoundsHowLongAPulseLasts) {

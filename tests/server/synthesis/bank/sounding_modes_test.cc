@@ -32,9 +32,17 @@ std::vector<double> EigenvaluesFor(std::vector<double> frequencies_hz,
 }
 
 SoundingModes Select(const std::vector<double>& eigenvalues, const SoundingMaterial& material,
-                     const SoundingBand& band = {}) {
+                     const SoundingBand& band = {}, double rate_hz = 48000) {
   const std::vector<double> couplings(eigenvalues.size(), 1.0);
-  return SelectSoundingModes({eigenvalues, couplings}, material, 48000, band);
+  return SelectSoundingModes({eigenvalues, couplings}, material, rate_hz, band);
+}
+
+/// The modes of the chime with these frequencies and couplings.
+std::vector<SoundingMode> SelectOfChime(const std::vector<double>& frequencies_hz,
+                                        const std::vector<double>& couplings,
+                                        const SoundingBand& band = {}) {
+  const std::vector<double> eigenvalues = EigenvaluesFor(frequencies_hz, kChime);
+  return SelectSoundingModes({eigenvalues, couplings}, kChime, 48000, band).modes;
 }
 
 TEST(SoundingModes, FrequencyDecayAndDampedFrequencyFollowTheRayleighDamping) {
@@ -110,12 +118,8 @@ TEST(SoundingModes, ModesOutsideTheBandAreDropped) {
   EXPECT_EQ(sounding.modes.front().column, 1u);
   EXPECT_EQ(sounding.modes.back().column, 3u);
   EXPECT_EQ(Select(eigenvalues, kChime, {.lowest_hz = 18}).modes.size(), 4u);
-}
-
-TEST(SoundingModes, NyquistBoundsTheBand) {
-  const auto eigenvalues = EigenvaluesFor({10000, 11026}, kChime);
-  const std::vector<double> couplings(2, 1.0);
-  EXPECT_EQ(SelectSoundingModes({eigenvalues, couplings}, kChime, 22050).modes.size(), 1u);
+  // Half of the sample rate bounds the band, too.
+  EXPECT_EQ(Select(EigenvaluesFor({10000, 11026}, kChime), kChime, {}, 22050).modes.size(), 1u);
 }
 
 TEST(SoundingModes, OverdampedModesAreDroppedThoughTheirFrequencyIsInTheBand) {
@@ -124,26 +128,21 @@ TEST(SoundingModes, OverdampedModesAreDroppedThoughTheirFrequencyIsInTheBand) {
       .young_pa = 2.8e8, .density_kg_per_m3 = 550, .alpha1_s = 8e-6, .alpha2_per_s = 50};
   const auto eigenvalues = EigenvaluesFor({4600, 4700, 39000, 40000}, wood);
   EXPECT_EQ(Select(eigenvalues, wood).modes.size(), 1u);
-  const SoundingModes all = SelectSoundingModes({eigenvalues, std::vector(4, 1.0)}, wood, 192000,
-                                                {.highest_hz = 1e6, .shortest_t60_s = 0});
-  EXPECT_EQ(all.modes.size(), 3u);
+  const SoundingBand all{.highest_hz = 1e6, .shortest_t60_s = 0};
+  EXPECT_EQ(Select(eigenvalues, wood, all, 192000).modes.size(), 3u);
 }
 
 TEST(SoundingModes, OfTooManyTheMostAudibleAreKeptInTheOrderOfTheModel) {
-  const auto eigenvalues = EigenvaluesFor({100, 200, 400, 800, 1600, 3200}, kChime);
-  const std::vector<double> couplings{1, 1e6, 2, 1e6, 1e6, 3};
-  const SoundingModes sounding =
-      SelectSoundingModes({eigenvalues, couplings}, kChime, 48000, {.most_modes = 3});
-  ASSERT_EQ(sounding.modes.size(), 3u);
-  EXPECT_EQ(sounding.modes[0].column, 1u);
-  EXPECT_EQ(sounding.modes[1].column, 3u);
-  EXPECT_EQ(sounding.modes[2].column, 4u);
+  const auto modes =
+      SelectOfChime({100, 200, 400, 800, 1600, 3200}, {1, 1e6, 2, 1e6, 1e6, 3}, {.most_modes = 3});
+  ASSERT_EQ(modes.size(), 3u);
+  EXPECT_EQ(modes[0].column, 1u);
+  EXPECT_EQ(modes[1].column, 3u);
+  EXPECT_EQ(modes[2].column, 4u);
 }
 
 TEST(SoundingModes, TheTwoOfADegeneratePairShareAllButAQuarterPeriod) {
-  const auto eigenvalues = EigenvaluesFor({587.0, 587.5, 1500}, kChime);
-  const std::vector<double> couplings{3, 4, 5};
-  const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
+  const auto modes = SelectOfChime({587.0, 587.5, 1500}, {3, 4, 5});
   ASSERT_EQ(modes.size(), 3u);
   EXPECT_EQ(modes[0].coupling, modes[1].coupling);
   EXPECT_EQ(modes[0].damped_rad_per_s, modes[1].damped_rad_per_s);
@@ -160,8 +159,7 @@ TEST(SoundingModes, ThreeOrMoreNeighboursApartFromOthersAreAMultiplet) {
                                3003.2, 3003.3, 3003.4, 5000, 5001,   5002, 5007,   5012};
   std::vector<double> couplings(hz.size(), 1);
   couplings[1] = 1.5;
-  const auto eigenvalues = EigenvaluesFor(hz, kChime);
-  const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
+  const auto modes = SelectOfChime(hz, couplings);
   std::vector<uint32_t> multiplets;
   multiplets.reserve(modes.size());
   for (const SoundingMode& mode : modes) multiplets.push_back(mode.multiplet);
@@ -173,20 +171,21 @@ TEST(SoundingModes, ThreeOrMoreNeighboursApartFromOthersAreAMultiplet) {
     EXPECT_EQ(modes[m].decay_rate_per_s, modes[0].decay_rate_per_s);
   }
   EXPECT_NEAR(modes[4].output_phase_rad, kPi / 2, 1e-15);
-  const auto directed =
-      SelectSoundingModes({eigenvalues, couplings}, kChime, 48000, {.directed = true}).modes;
+  const auto directed = SelectOfChime(hz, couplings, {.directed = true});
   EXPECT_EQ(directed[2].natural_frequency_hz, modes[2].natural_frequency_hz);
   EXPECT_NEAR(directed[1].coupling, 1.5 * unit, 1e-9 * unit);
   EXPECT_EQ(directed[1].multiplet, 0U);
 }
 
-TEST(SoundingModes, ModesOfOneFrequencyAndDifferentCouplingsAreNoMultiplet) {
+TEST(SoundingModes, ModesOfOneFrequencyAndDifferentCouplingsAreNoMultipletOrPair) {
   // The twisting modes of a ball hardly move the air.
-  const auto modes =
-      SelectSoundingModes({EigenvaluesFor({1000, 1000.1, 1000.2}, kChime), std::vector{1., 1., 2.}},
-                          kChime, 48000)
-          .modes;
-  for (const SoundingMode& mode : modes) EXPECT_EQ(mode.multiplet, 0U);
+  for (const SoundingMode& mode : SelectOfChime({1000, 1000.1, 1000.2}, {1, 1, 2})) {
+    EXPECT_EQ(mode.multiplet, 0U);
+  }
+  // A torsional mode that happens to lie beside a bending one.
+  const auto modes = SelectOfChime({587.0, 587.1}, {3, 0.01});
+  EXPECT_NEAR(modes[0].natural_frequency_hz, 587.0, 1e-9);
+  EXPECT_EQ(modes[1].output_phase_rad, 0);
 }
 
 /// Returns the partner of each mode, or the mode itself, by the definition: the closest two of the
@@ -201,8 +200,9 @@ std::vector<size_t> PartnersByDefinition(const std::vector<double>& ascending_hz
       return ascending_hz[single[i + 1]] / ascending_hz[single[i]] - 1;
     };
     size_t closest = 0;
-    for (size_t i = 1; i + 1 < single.size(); ++i)
+    for (size_t i = 1; i + 1 < single.size(); ++i) {
       closest = split(i) < split(closest) ? i : closest;
+    }
     if (split(closest) > tolerance) break;
     partners[single[closest]] = single[closest + 1];
     partners[single[closest + 1]] = single[closest];
@@ -220,24 +220,13 @@ TEST(SoundingModes, ThePairsOfAThousandDenseModesAreThoseOfTheDefinition) {
     frequencies_hz.push_back(frequencies_hz.back() * ratio(random));
   }
   const std::vector<size_t> partners = PartnersByDefinition(frequencies_hz);
-  const std::vector<double> couplings(frequencies_hz.size(), 1);
-  const auto modes = SelectSoundingModes({EigenvaluesFor(frequencies_hz, kChime), couplings},
-                                         kChime, 48000, {.most_modes = frequencies_hz.size()})
-                         .modes;
+  const auto modes = SelectOfChime(frequencies_hz, std::vector(frequencies_hz.size(), 1.0),
+                                   {.most_modes = frequencies_hz.size()});
   ASSERT_EQ(modes.size(), frequencies_hz.size());
   for (size_t i = 0; i < modes.size(); ++i) {
     const double mean_hz = (frequencies_hz[i] + frequencies_hz[partners[i]]) / 2;
     EXPECT_NEAR(modes[i].natural_frequency_hz, mean_hz, 1e-9 * mean_hz) << i;
   }
-}
-
-TEST(SoundingModes, NeighboursThatRadiateDifferentlyAreNoPair) {
-  // A torsional mode that happens to lie beside a bending one.
-  const auto eigenvalues = EigenvaluesFor({587.0, 587.1}, kChime);
-  const std::vector<double> couplings{3, 0.01};
-  const auto modes = SelectSoundingModes({eigenvalues, couplings}, kChime, 48000).modes;
-  EXPECT_NEAR(modes[0].natural_frequency_hz, 587.0, 1e-9);
-  EXPECT_EQ(modes[1].output_phase_rad, 0);
 }
 
 /// Radiation of modes with these power integrals, into the air of the defaults.

@@ -14,19 +14,17 @@ constexpr uint64_t kLater = 1'000'000;
 
 bool Never(const MixerEvent&, uint32_t) { return false; }
 
-/// Number of events at a frame that the owner can push.
-size_t Fill(PendingEvents& pending, uint32_t owner, uint64_t frame = kLater) {
+/// Number of such events at a frame that the owner can push.
+size_t Fill(PendingEvents& pending, uint32_t owner, uint64_t frame = kLater,
+            const MixerEvent::Action& action = {}) {
   size_t count = 0;
-  while (pending.TryPush({.frame = frame}, 0, owner)) ++count;
+  while (pending.TryPush({.frame = frame, .action = action}, 0, owner)) ++count;
   return count;
 }
 
-TEST(PendingEvents, ASingleOwnerMayFillTheTable) {
-  PendingEvents pending(kCapacity, kBlock);
-  EXPECT_EQ(Fill(pending, 0), kCapacity);
-}
-
-TEST(PendingEvents, AnOwnerLeavesPlacesToTheNext) {
+TEST(PendingEvents, AnOwnerLeavesPlacesToTheNextIfThereIsOne) {
+  PendingEvents alone(kCapacity, kBlock);
+  EXPECT_EQ(Fill(alone, 0), kCapacity);
   PendingEvents pending(kCapacity, kBlock, 3);
   EXPECT_EQ(Fill(pending, 0), 4 * kCapacity / 5);
   const size_t left = kCapacity - 4 * kCapacity / 5;
@@ -60,52 +58,24 @@ TEST(PendingEvents, StaleEventsAreCollectedBeforeTheyAreDue) {
   EXPECT_EQ(pending.tag(due[0]), 2U);
 }
 
-/// As Fill, with impulses.
-size_t FillWithImpulses(PendingEvents& pending, uint32_t owner, uint64_t frame) {
-  size_t count = 0;
-  while (pending.TryPush({.frame = frame, .action = SurfaceImpulse{}}, 0, owner)) ++count;
-  return count;
-}
-
-/// Number of other events at a frame that the owner can push.
-size_t FillWithKnots(PendingEvents& pending, uint32_t owner, uint64_t frame) {
-  size_t count = 0;
-  while (pending.TryPush({.frame = frame, .action = ForceKnot{}}, 0, owner)) ++count;
-  return count;
-}
-
 TEST(PendingEvents, EachBlockHasPlacesForImpulsesAndForOtherEvents) {
   PendingEvents pending(kCapacity, kBlock, 1, {.impulses = 100, .others = 200});
-  EXPECT_EQ(FillWithImpulses(pending, 0, kBlock), 100U);
+  EXPECT_EQ(Fill(pending, 0, kBlock, SurfaceImpulse{}), 100U);
   EXPECT_FALSE(pending.TryPush({.frame = kBlock, .fraction = 0.5F, .action = ContactBegin{}}));
   // The first sample of an event between two samples is the later one, here of the next block.
   EXPECT_TRUE(
       pending.TryPush({.frame = 2 * kBlock - 1, .fraction = 0.5F, .action = ContactBegin{}}));
-  EXPECT_EQ(FillWithKnots(pending, 0, 2 * kBlock - 1), 200U);
-  EXPECT_EQ(FillWithImpulses(pending, 0, 2 * kBlock), 99U);
+  EXPECT_EQ(Fill(pending, 0, 2 * kBlock - 1, ForceKnot{}), 200U);
+  EXPECT_EQ(Fill(pending, 0, 2 * kBlock, SurfaceImpulse{}), 99U);
 }
 
 TEST(PendingEvents, OwnersShareThePlacesOfABlock) {
   PendingEvents pending(kCapacity, kBlock, 3, {.impulses = 100, .others = 200});
-  EXPECT_EQ(FillWithImpulses(pending, 0, kBlock), 80U);
-  EXPECT_EQ(FillWithImpulses(pending, 1, kBlock), 16U);
-  EXPECT_GT(FillWithImpulses(pending, 2, kBlock), 0U);
-  EXPECT_EQ(FillWithKnots(pending, 1, 2 * kBlock), 160U);
-  EXPECT_EQ(FillWithImpulses(pending, 1, 2 * kBlock), 48U);  // 208 are four times the free 52
-}
-
-TEST(PendingEvents, ABlockThatWasCollectedGivesItsPlacesBack) {
-  constexpr uint64_t kListCount = 4096;
-  PendingEvents pending(kCapacity, kBlock, 2, {.impulses = 100, .others = 200});
-  FixedVector<uint32_t> due(kCapacity);
-  for (uint64_t round = 0; round < 3; ++round) {
-    const uint64_t frame = round * kListCount * kBlock;  // always of the same list
-    EXPECT_EQ(FillWithImpulses(pending, 0, frame), 80U);
-    EXPECT_GT(FillWithKnots(pending, 0, frame), 0U);
-    pending.Collect(frame, due, Never);
-    pending.Free(due);
-    due.clear();
-  }
+  EXPECT_EQ(Fill(pending, 0, kBlock, SurfaceImpulse{}), 80U);
+  EXPECT_EQ(Fill(pending, 1, kBlock, SurfaceImpulse{}), 16U);
+  EXPECT_GT(Fill(pending, 2, kBlock, SurfaceImpulse{}), 0U);
+  EXPECT_EQ(Fill(pending, 1, 2 * kBlock, ForceKnot{}), 160U);
+  EXPECT_EQ(Fill(pending, 1, 2 * kBlock, SurfaceImpulse{}), 48U);  // 208 are four times the free 52
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
-
 namespace carillon {
 namespace {
 
@@ -24,22 +22,6 @@ TEST(RenderOrder, GivesBackTheLargestValueOfEachField) {
   EXPECT_EQ(back.offset, most.offset);
   EXPECT_TRUE(back.merged);
   EXPECT_EQ(back.arrival, most.arrival);
-}
-
-TEST(RenderOrder, AFieldOutweighsAllThatFollowIt) {
-  // Each comes after the one before by one field, and before it by all later fields.
-  const std::array<Fields, 7> ascending = {{
-      {.section = 0, .block = 9, .slot = 9, .offset = 99, .merged = true, .arrival = 9},
-      {.section = 1, .block = 0, .slot = 9, .offset = 99, .merged = true, .arrival = 9},
-      {.section = 1, .block = 1, .slot = 0, .offset = 99, .merged = true, .arrival = 9},
-      {.section = 1, .block = 1, .slot = 1, .offset = 3, .merged = true, .arrival = 9},
-      {.section = 1, .block = 1, .slot = 1, .offset = 7, .merged = false, .arrival = 9},
-      {.section = 1, .block = 1, .slot = 1, .offset = 4, .merged = true, .arrival = 0},
-      {.section = 1, .block = 1, .slot = 1, .offset = 4, .merged = true, .arrival = 1},
-  }};
-  for (size_t i = 1; i < ascending.size(); ++i) {
-    EXPECT_LT(RenderOrder(ascending[i - 1]), RenderOrder(ascending[i])) << i;
-  }
 }
 
 }  // namespace

@@ -6,13 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <functional>
 #include <memory>
 #include <numbers>
 #include <vector>
 
-#include "server/synthesis/voice/head.h"
-#include "server/synthesis/voice/voice.h"
+#include "tests/server/synthesis/voice/heard.h"
 #include "tests/server/synthesis/voice/sphere_head.h"
 
 namespace carillon {
@@ -20,7 +18,6 @@ namespace {
 
 constexpr double kRate = SphereHead::kRate;
 constexpr double kPi = std::numbers::pi;
-using Ears2 = std::array<std::vector<double>, 2>;
 
 const std::shared_ptr<const Head>& TheHead() {
   static const auto head = std::make_shared<const Head>(SphereHead::Make());
@@ -32,83 +29,39 @@ Vector3 At(double degrees_to_the_right, double distance = 1) {
   return {distance * std::sin(angle), 0, -distance * std::cos(angle)};
 }
 
-Motion MotionTo(const Vector3& to, double glide_frames) {
-  Motion motion{.glide_frames = static_cast<float>(glide_frames)};
-  for (size_t i = 0; i < 3; ++i) motion.position_m[i] = static_cast<float>(to[i]);
-  return motion;
-}
-
-using AtBlock = std::function<void(Voice& voice, size_t frame)>;
-
-Ears2 Play(const HearingSettings& hearing, const Vector3& from, const std::vector<float>& sound,
-           const AtBlock& at_block = {}, size_t block = 128, size_t channels = 2) {
-  Voice voice({.hearing = hearing,
-               .sample_rate_hz = kRate,
-               .block_frame_count = block,
-               .channel_count = channels,
-               .head = TheHead()},
-              {.position_m = from}, {});
-  Ears2 heard;
-  std::vector<float> frames(block * channels);
-  for (size_t n = 0; n + block <= sound.size(); n += block) {
-    if (at_block) at_block(voice, n);
-    std::copy_n(sound.begin() + static_cast<std::ptrdiff_t>(n), block, voice.input().begin());
-    std::ranges::fill(frames, 0.0F);
-    voice.Render(frames);
-    for (size_t i = 0; i < block; ++i) {
-      heard[0].push_back(frames[i * channels]);
-      heard[1].push_back(frames[(i + 1) * channels - 1]);
-    }
-  }
-  return heard;
-}
-
-std::vector<float> Click(size_t frame, size_t frame_count) {
-  std::vector<float> click(frame_count);
-  click[frame] = 1;
-  return click;
-}
-
-std::vector<float> Tone(double frequency_hz, size_t frame_count) {
-  std::vector<float> tone(frame_count);
-  for (size_t n = 0; n < tone.size(); ++n) {
-    tone[n] = static_cast<float>(std::sin(2 * kPi * frequency_hz / kRate * static_cast<double>(n)));
-  }
-  return tone;
-}
-
-double PeakOf(const std::vector<double>& sound) {
-  double peak = 0;
-  for (const double x : sound) peak = std::max(peak, std::abs(x));
-  return peak;
+Channels Play(const HearingSettings& hearing, const Vector3& from, const std::vector<float>& sound,
+              const std::function<void(Voice&, size_t)>& at_block = {}, size_t block = 128,
+              size_t channels = 2) {
+  return Heard(hearing, {.position_m = from}, channels, TheHead(), block).Play(sound, at_block);
 }
 
 /// The frame of the peak, between frames by a parabola.
-double PeakFrame(const std::vector<double>& sound) {
-  const auto peak = std::ranges::max_element(sound, {}, [](double x) { return std::abs(x); });
+double PeakFrame(const std::vector<float>& sound) {
+  const auto peak = std::ranges::max_element(sound, {}, [](float x) { return std::abs(x); });
   const double before = peak[-1], at = peak[0], after = peak[1];
   return static_cast<double>(peak - sound.begin()) +
          (before - after) / (2 * (before - 2 * at + after));
 }
 
 /// The level of a sound at a frequency, dB.
-double LevelAt(const std::vector<double>& sound, double frequency_hz) {
+double LevelAt(const std::vector<float>& sound, double frequency_hz) {
   std::complex<double> sum = 0;
   for (size_t n = 0; n < sound.size(); ++n) {
-    sum += sound[n] * std::polar(1.0, -2 * kPi * frequency_hz / kRate * static_cast<double>(n));
+    sum += double{sound[n]} *
+           std::polar(1.0, -2 * kPi * frequency_hz / kRate * static_cast<double>(n));
   }
   return 20 * std::log10(std::abs(sum) + 1e-12);
 }
 
 /// Returns the greatest amplitude of a sound after a high pass, which shows steps. Eight
 /// differences, each of gain 1 at half of the sample rate, leave 2e-13 of a tone of 400 Hz.
-double FastestPart(const std::vector<double>& sound) {
+double FastestPart(const std::vector<float>& sound) {
   std::vector<double> left(sound.begin() + 2000, sound.end());
   for (int order = 0; order < 8; ++order) {
     for (size_t n = left.size() - 1; n > 0; --n) left[n] = (left[n] - left[n - 1]) / 2;
     left.erase(left.begin());
   }
-  return PeakOf(left);
+  return Peak(left);
 }
 
 TEST(HeadTest, KeepsTheDelaysBetweenTheMeasuredDirections) {
@@ -129,7 +82,7 @@ TEST(HeadTest, DoesNotCombBetweenTheMeasuredDirections) {
     const auto level = [frequency_hz](double degrees) {
       EarResponses responses = TheHead()->Silent();
       TheHead()->Respond(At(degrees), responses);
-      return LevelAt({responses[0].taps.begin(), responses[0].taps.end()}, frequency_hz);
+      return LevelAt(responses[0].taps, frequency_hz);
     };
     EXPECT_NEAR(level(35), (level(30) + level(40)) / 2, 0.3) << frequency_hz;
   }
@@ -141,7 +94,7 @@ TEST(HeadTest, IsAsLoudFromStraightAheadAsPanningIs) {
   TheHead()->Respond(At(0), responses);
   constexpr int kCount = 200;
   for (int i = 1; i <= kCount; ++i) {
-    const double level = LevelAt({responses[1].taps.begin(), responses[1].taps.end()}, 50.0 * i);
+    const double level = LevelAt(responses[1].taps, 50.0 * i);
     power += std::pow(10, level / 10) / kCount;
   }
   EXPECT_NEAR(power, 1, 0.02);
@@ -164,11 +117,11 @@ TEST(BinauralTest, DistanceAndPropagationAddToTheEars) {
   const auto near = Play(hearing, At(0, 1), Click(1000, 16384));
   const auto far = Play(hearing, At(0, 35.3), Click(1000, 16384));
   EXPECT_NEAR(PeakFrame(far[0]) - PeakFrame(near[0]), 34.3 / 343 * kRate, 0.3);
-  EXPECT_NEAR(PeakOf(near[0]) / PeakOf(far[0]), 35.3, 0.4);
+  EXPECT_NEAR(Peak(near[0]) / Peak(far[0]), 35.3, 0.4);
 }
 
 TEST(BinauralTest, TheSizeOfBlocksMakesNoDifferenceAtRest) {
-  const std::vector<float> tone = Tone(700, 8192);
+  const std::vector<float> tone = Tone(700, 0.16, 1);
   const auto a = Play({.binaural = true}, At(50), tone, {}, 64);
   const auto b = Play({.binaural = true}, At(50), tone, {}, 128);
   for (size_t n = 0; n + 64 < a[0].size(); ++n) {  // a voice is one block late
@@ -177,19 +130,9 @@ TEST(BinauralTest, TheSizeOfBlocksMakesNoDifferenceAtRest) {
   }
 }
 
-TEST(BinauralTest, AnObjectThatCirclesTheHeadDoesNotClick) {
-  const auto heard = Play({.binaural = true}, At(0), Tone(400, 96000), [](Voice& voice, size_t n) {
-    if (n % 800 < 128) voice.Move(MotionTo(At(static_cast<double>(n) / 96000 * 720), 800), 0);
-  });
-  for (const auto& ear : heard) {
-    EXPECT_GT(PeakOf(ear), 0.5);
-    EXPECT_LT(FastestPart(ear), 3e-5 * PeakOf(ear));  // -90 dB
-  }
-}
-
-TEST(BinauralTest, AListenerWhoTurnsHearsAsIfTheObjectCircled) {
+TEST(BinauralTest, AnObjectThatCirclesDoesNotClickAndIsHeardAsIfTheListenerTurned) {
   const auto angle = [](size_t n) { return static_cast<double>(n) / 96000 * 720; };
-  const std::vector<float> tone = Tone(400, 96000);
+  const std::vector<float> tone = Tone(400, 2, 1);
   const auto turned = Play({.binaural = true}, At(0), tone, [&angle](Voice& voice, size_t n) {
     if (n % 800 >= 128) return;
     // To the left, so that the object wanders to the right; half of the angle in the quaternion.
@@ -204,30 +147,29 @@ TEST(BinauralTest, AListenerWhoTurnsHearsAsIfTheObjectCircled) {
     if (n % 800 < 128) voice.Move(MotionTo(At(angle(n)), 800), 0);
   });
   for (const size_t ear : {0U, 1U}) {
-    EXPECT_LT(FastestPart(turned[ear]), 3e-5 * PeakOf(turned[ear]));  // -90 dB
-    double most = 0;
-    for (size_t n = 0; n < turned[ear].size(); ++n) {
-      most = std::max(most, std::abs(turned[ear][n] - circled[ear][n]));
-    }
-    EXPECT_LT(most, 0.01 * PeakOf(circled[ear]));
+    EXPECT_GT(Peak(circled[ear]), 0.5);
+    EXPECT_LT(FastestPart(circled[ear]), 3e-5 * Peak(circled[ear]));  // -90 dB
+    EXPECT_LT(FastestPart(turned[ear]), 3e-5 * Peak(turned[ear]));
+    EXPECT_LT(LargestDifference(turned[ear], circled[ear]), 0.01 * Peak(circled[ear]));
   }
 }
 
 TEST(BinauralTest, AJumpIsACrossFadeFromTheSoundBefore) {
-  const auto heard = Play({.binaural = true}, At(-70), Tone(400, 9600), [](Voice& voice, size_t n) {
-    if (n == 4992) voice.Move(MotionTo(At(70), 0), 0);
-  });
-  const auto after = Play({.binaural = true}, At(70), Tone(400, 9600));
+  const auto heard =
+      Play({.binaural = true}, At(-70), Tone(400, 0.2, 1), [](Voice& voice, size_t n) {
+        if (n == 4992) voice.Move(MotionTo(At(70), 0), 0);
+      });
+  const auto after = Play({.binaural = true}, At(70), Tone(400, 0.2, 1));
   for (const size_t ear : {0U, 1U}) {
-    EXPECT_LT(FastestPart(heard[ear]), 1e-3 * PeakOf(heard[ear]));
+    EXPECT_LT(FastestPart(heard[ear]), 1e-3 * Peak(heard[ear]));
     for (size_t n = 6500; n < 9500; ++n) ASSERT_NEAR(heard[ear][n], after[ear][n], 1e-4) << n;
   }
 }
 
 TEST(BinauralTest, AnObjectAtTheListenersPlaceIsHeard) {
   const auto [left, right] = Play({.binaural = true}, {}, Click(1000, 4096));
-  EXPECT_GT(PeakOf(left), 0.3);
-  EXPECT_NEAR(PeakOf(left), PeakOf(right), 0.02);
+  EXPECT_GT(Peak(left), 0.3);
+  EXPECT_NEAR(Peak(left), Peak(right), 0.02);
 }
 
 TEST(BinauralTest, SilenceEndsWhatIsOnItsWay) {
@@ -235,8 +177,8 @@ TEST(BinauralTest, SilenceEndsWhatIsOnItsWay) {
                           Click(100, 16384), [](Voice& voice, size_t n) {
                             if (n == 1024) voice.Silence();
                           });
-  EXPECT_EQ(PeakOf(heard[0]), 0);
-  EXPECT_EQ(PeakOf(heard[1]), 0);
+  EXPECT_EQ(Peak(heard[0]), 0);
+  EXPECT_EQ(Peak(heard[1]), 0);
 }
 
 TEST(BinauralTest, FallsAsleepOnceAllHasArrived) {
@@ -249,21 +191,19 @@ TEST(BinauralTest, FallsAsleepOnceAllHasArrived) {
   for (int block = 0; block < 100 && !voice.asleep(); ++block) {
     std::ranges::fill(frames, 0.0F);
     voice.Render(frames);
-    for (const float x : frames) energy += double{x} * x;
+    energy += Energy(frames);
   }
   EXPECT_TRUE(voice.asleep());
   EarResponses responses = TheHead()->Silent();
   TheHead()->Respond(At(20), responses);
   double whole = 0;
-  for (const EarResponse& ear : responses) {
-    for (const float tap : ear.taps) whole += double{tap} * tap;
-  }
+  for (const EarResponse& ear : responses) whole += Energy(ear.taps);
   EXPECT_NEAR(energy, whole, 0.02 * whole);
 }
 
 TEST(BinauralTest, OneChannelHasNoEars) {
   const auto heard = Play({.binaural = true}, At(90), Click(1000, 4096), {}, 128, 1);
-  EXPECT_DOUBLE_EQ(PeakOf(heard[0]), 1);
+  EXPECT_DOUBLE_EQ(Peak(heard[0]), 1);
   EXPECT_EQ(heard[0], heard[1]);
 }
 
