@@ -4,10 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <limits>
-
-#include "absl/strings/str_cat.h"
 
 namespace carillon {
 namespace {
@@ -25,8 +22,7 @@ TEST(Contact, AnImpulseMustBeFinite) {
   for (const double bad : {kNan, kInfinity, -kInfinity, 4e38, -1e300}) {
     ContactImpulse contact = MakeContact();
     contact.impulse_newton_seconds[1] = bad;
-    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("CONTACT_MALFORMED"));
-    EXPECT_THAT(Validate(contact).ToString(), HasSubstr(absl::StrCat(", ", bad, ", ")));
+    EXPECT_THAT(Validate(contact).ToString(), HasSubstr("CONTACT_MALFORMED")) << bad;
   }
 }
 

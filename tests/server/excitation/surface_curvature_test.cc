@@ -5,91 +5,46 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <vector>
 
 #include "server/excitation/surface_measures.h"
+#include "tests/server/excitation/meshes.h"
 
 namespace carillon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+/// A sphere of 2 cm as a lathe makes it: long triangles at the poles.
+Mesh Sphere(uint32_t rings, uint32_t sides) { return MakeSphere(0.02, rings, sides, 0.02); }
 
-struct Mesh {
-  std::vector<std::array<float, 3>> vertices;
-  std::vector<std::array<uint32_t, 3>> triangles;
-
-  Point Middle(uint32_t triangle) const {
-    Point middle{};
-    for (const uint32_t vertex : triangles[triangle]) {
-      for (size_t axis = 0; axis < 3; ++axis) middle[axis] += vertices[vertex][axis] / 3.0;
-    }
-    return middle;
-  }
-  void TurnInsideOut() {
-    for (auto& triangle : triangles) std::swap(triangle[1], triangle[2]);
-  }
-};
-
-/// A sphere of `rings` rings of `sides` facets, as a lathe makes it: long triangles at the poles.
-Mesh Sphere(double radius_m, uint32_t rings, uint32_t sides) {
-  Mesh mesh;
-  for (uint32_t ring = 0; ring <= rings; ++ring) {
-    const double polar = kPi * (0.02 + 0.96 * ring / rings);
-    for (uint32_t side = 0; side < sides; ++side) {
-      const double angle = 2 * kPi * side / sides;
-      mesh.vertices.push_back({static_cast<float>(radius_m * std::sin(polar) * std::cos(angle)),
-                               static_cast<float>(radius_m * std::sin(polar) * std::sin(angle)),
-                               static_cast<float>(radius_m * std::cos(polar))});
-    }
-  }
-  for (uint32_t ring = 0; ring < rings; ++ring) {
-    for (uint32_t side = 0; side < sides; ++side) {
-      const uint32_t next = (side + 1) % sides, a = ring * sides + side, b = ring * sides + next;
-      mesh.triangles.push_back({a, a + sides, b});
-      mesh.triangles.push_back({b, a + sides, b + sides});
-    }
-  }
-  return mesh;
-}
-
-/// A box of 100 by 60 by 40 mm, each face two triangles.
-Mesh Box() {
-  Mesh mesh;
-  for (uint32_t corner = 0; corner < 8; ++corner) {
-    mesh.vertices.push_back({(corner & 1) != 0 ? 0.1F : 0, (corner & 2) != 0 ? 0.06F : 0,
-                             (corner & 4) != 0 ? 0.04F : 0});
-  }
-  for (const std::array<uint32_t, 4>& face : std::vector<std::array<uint32_t, 4>>{
-           {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
-    mesh.triangles.push_back({face[0], face[1], face[2]});
-    mesh.triangles.push_back({face[0], face[2], face[3]});
-  }
-  return mesh;
-}
+Mesh Box() { return MakeBox(0.1, 0.06, 0.04); }
 
 SurfaceCurvature CurvatureOf(const Mesh& mesh) {
   return SurfaceCurvature(mesh.vertices, mesh.triangles);
 }
 
+/// The curvature in the middle of a triangle.
+double InMiddle(const Mesh& mesh, const SurfaceCurvature& curvature, uint32_t triangle,
+                double size = 1) {
+  return curvature.At(triangle, mesh.At(mesh.triangles[triangle], {1. / 3, 1. / 3, 1. / 3}), size);
+}
+
 TEST(SurfaceCurvature, ASphereHasThatOfItsRadiusHoweverItIsDivided) {
   for (const uint32_t rings : {12U, 40U}) {
     for (const uint32_t sides : {12U, 90U}) {
-      Mesh mesh = Sphere(0.02, rings, sides);
+      Mesh mesh = Sphere(rings, sides);
       const SurfaceCurvature curvature = CurvatureOf(mesh);
       const uint32_t middle = rings / 2 * 2 * sides;
-      EXPECT_NEAR(curvature.At(middle, mesh.Middle(middle), 1), 50, 5) << rings << ", " << sides;
-      EXPECT_NEAR(curvature.At(middle, mesh.Middle(middle), 10), 5, 0.5);
+      EXPECT_NEAR(InMiddle(mesh, curvature, middle), 50, 5) << rings << ", " << sides;
+      EXPECT_NEAR(InMiddle(mesh, curvature, middle, 10), 5, 0.5);
       mesh.TurnInsideOut();
-      const SurfaceCurvature other = CurvatureOf(mesh);
-      EXPECT_NEAR(other.At(middle, mesh.Middle(middle), 1), 50, 5);
+      EXPECT_NEAR(InMiddle(mesh, CurvatureOf(mesh), middle), 50, 5);
     }
   }
 }
 
 TEST(SurfaceCurvature, NoiseOfAScannedSphereIsAveraged) {
-  Mesh mesh = Sphere(0.02, 40, 60);
+  Mesh mesh = Sphere(40, 60);
   std::mt19937 random(7);
   std::normal_distribution<float> noise(0, 2e-5F);  // 1 % of the edges
   for (auto& vertex : mesh.vertices) {
@@ -97,8 +52,7 @@ TEST(SurfaceCurvature, NoiseOfAScannedSphereIsAveraged) {
   }
   const SurfaceCurvature curvature = CurvatureOf(mesh);
   std::vector<double> found;
-  for (uint32_t t = 20 * 120; t < 22 * 120; ++t)
-    found.push_back(curvature.At(t, mesh.Middle(t), 1));
+  for (uint32_t t = 20 * 120; t < 22 * 120; ++t) found.push_back(InMiddle(mesh, curvature, t));
   std::ranges::sort(found);
   EXPECT_NEAR(found[found.size() / 2], 50, 5);
   EXPECT_GT(found[found.size() / 10], 25);
@@ -131,22 +85,14 @@ TEST(SurfaceCurvature, ACornerIsSharpOnEachOfItsTriangles) {
 
 TEST(SurfaceCurvature, ARimThatTurnsGraduallyHasNoCorners) {
   // A cylinder of 48 sides, closed by fans: the rims are edges everywhere.
-  Mesh mesh;
   constexpr uint32_t kSides = 48;
-  for (uint32_t side = 0; side < kSides; ++side) {
-    const double angle = 2 * kPi * side / kSides;
-    for (const float z : {0.0F, 0.1F}) {
-      mesh.vertices.push_back({static_cast<float>(0.1 * std::cos(angle)),
-                               static_cast<float>(0.1 * std::sin(angle)), z});
-    }
-  }
-  mesh.vertices.push_back({0, 0, 0});
+  Mesh mesh = Lathe(1, kSides, [](uint32_t ring) { return std::pair(0.1, 0.1 * (1.0 - ring)); });
   mesh.vertices.push_back({0, 0, 0.1F});
-  for (uint32_t side = 0; side < kSides; ++side) {
-    const uint32_t a = 2 * side, b = 2 * ((side + 1) % kSides);
-    mesh.triangles.insert(
-        mesh.triangles.end(),
-        {{a, b, a + 1}, {b, b + 1, a + 1}, {b, a, 2 * kSides}, {a + 1, b + 1, 2 * kSides + 1}});
+  mesh.vertices.push_back({0, 0, 0});
+  for (uint32_t a = 0; a < kSides; ++a) {
+    const uint32_t b = (a + 1) % kSides;
+    mesh.triangles.push_back({a, b, 2 * kSides});
+    mesh.triangles.push_back({b + kSides, a + kSides, 2 * kSides + 1});
   }
   const SurfaceCurvature curvature = CurvatureOf(mesh);
   for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -160,14 +106,7 @@ TEST(SurfaceCurvature, AnInnerEdgeIsNotSharp) {
   mesh.TurnInsideOut();
   // Beside it, a large box of the right side, so that the surface as a whole is not inside out: a
   // body with a hollow in the shape of a box.
-  const Mesh outer = Box();
-  const auto count = static_cast<uint32_t>(mesh.vertices.size());
-  for (const auto& vertex : outer.vertices) {
-    mesh.vertices.push_back({3 * vertex[0] - 0.1F, 3 * vertex[1] - 0.06F, 3 * vertex[2] - 0.04F});
-  }
-  for (const auto& [a, b, c] : outer.triangles) {
-    mesh.triangles.push_back({a + count, b + count, c + count});
-  }
+  mesh.Add(Box(), 3, {-0.1F, -0.06F, -0.04F});
   const SurfaceCurvature curvature = CurvatureOf(mesh);
   EXPECT_EQ(curvature.At(0, {0, 0.03, 0}, 1), 0);
   EXPECT_NEAR(VolumeM3(mesh.vertices, mesh.triangles), 26 * 0.1 * 0.06 * 0.04, 1e-9);

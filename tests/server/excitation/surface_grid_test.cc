@@ -4,65 +4,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <random>
-#include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "server/excitation/closest_point.h"
 #include "server/excitation/surface_locator.h"
+#include "tests/server/excitation/meshes.h"
 
 namespace carillon {
 namespace {
-
-using Vertex = std::array<float, 3>;
-using Triangle = std::array<uint32_t, 3>;
-
-struct Mesh {
-  std::vector<Vertex> vertices;
-  std::vector<Triangle> triangles;
-};
-
-Vertex ToVertex(double x, double y, double z) {
-  return {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
-}
-
-Mesh Sphere(uint32_t rings, uint32_t sides) {
-  Mesh mesh;
-  for (uint32_t ring = 0; ring <= rings; ++ring) {
-    const double down = M_PI * ring / rings;
-    for (uint32_t side = 0; side < sides; ++side) {
-      const double around = 2 * M_PI * side / sides;
-      mesh.vertices.push_back(ToVertex(0.1 * std::sin(down) * std::cos(around),
-                                       0.1 * std::sin(down) * std::sin(around),
-                                       0.1 * std::cos(down)));
-    }
-  }
-  for (uint32_t ring = 0; ring < rings; ++ring) {
-    for (uint32_t side = 0; side < sides; ++side) {
-      const uint32_t a = ring * sides + side, b = ring * sides + (side + 1) % sides;
-      mesh.triangles.push_back({a, b, b + sides});
-      mesh.triangles.push_back({a, b + sides, a + sides});
-    }
-  }
-  return mesh;
-}
-
-/// A box of 12 triangles.
-Mesh Box(double x, double y, double z) {
-  Mesh mesh;
-  for (uint32_t i = 0; i < 8; ++i) {
-    mesh.vertices.push_back(ToVertex((i & 1) * x, (i >> 1 & 1) * y, (i >> 2 & 1) * z));
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
-}
 
 /// Two sides of `count` x `count` squares, `thickness` apart.
 Mesh Plate(uint32_t count, double thickness) {
@@ -128,65 +82,55 @@ Mesh Soup(std::mt19937& random) {
 
 /// Far from even: a fine sphere beside a box a thousand times as large.
 Mesh Uneven() {
-  Mesh mesh = Sphere(20, 20);
-  const auto begin = static_cast<uint32_t>(mesh.vertices.size());
-  const Mesh box = Box(100, 80, 90);
-  mesh.vertices.insert(mesh.vertices.end(), box.vertices.begin(), box.vertices.end());
-  for (const auto& [a, b, c] : box.triangles) {
-    mesh.triangles.push_back({a + begin, b + begin, c + begin});
-  }
+  Mesh mesh = MakeSphere(0.1, 20, 20);
+  mesh.Add(MakeBox(100, 80, 90));
   return mesh;
 }
 
-/// The vertices and triangles of an OBJ file; none if there is no such file.
-Mesh ReadObj(const std::string& path) {
-  Mesh mesh;
-  std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
-    std::istringstream words(line);
-    std::string kind, a, b, c;
-    words >> kind >> a >> b >> c;
-    if (kind == "v") mesh.vertices.push_back({std::stof(a), std::stof(b), std::stof(c)});
-    const auto index = [](const std::string& word) {
-      return static_cast<uint32_t>(std::stoul(word)) - 1;
-    };
-    if (kind == "f") mesh.triangles.push_back({index(a), index(b), index(c)});
+/// A sphere as a scanner might see it.
+Mesh NoisySphere(std::mt19937& random) {
+  Mesh mesh = MakeSphere(0.1, 60, 60);
+  std::normal_distribution<float> noise(0, 1e-3F);
+  for (Vertex& vertex : mesh.vertices) {
+    for (float& x : vertex) x += noise(random);
   }
   return mesh;
 }
 
 std::map<std::string, Mesh> Meshes() {
   std::mt19937 random(7);
-  std::map<std::string, Mesh> meshes{
-      {"sphere", Sphere(40, 40)}, {"box", Box(0.1, 0.2, 0.3)}, {"bar", Box(0.2, 0.016, 0.0101)},
-      {"foil", Plate(20, 1e-5)},  {"one side", Plate(20, 0)},  {"slivers", Slivers(random)},
-      {"cone", Cone(1000)},       {"soup", Soup(random)},      {"uneven", Uneven()}};
-  const std::string bunny = "/usr/share/glmark2/models/bunny.obj";
-  if (std::filesystem::exists(bunny)) meshes["bunny"] = ReadObj(bunny);
-  return meshes;
+  return {{"sphere", MakeSphere(0.1, 40, 40)},
+          {"box", MakeBox(0.1, 0.2, 0.3)},
+          {"bar", MakeBox(0.2, 0.016, 0.0101)},
+          {"foil", Plate(20, 1e-5)},
+          {"one side", Plate(20, 0)},
+          {"slivers", Slivers(random)},
+          {"cone", Cone(1000)},
+          {"soup", Soup(random)},
+          {"uneven", Uneven()},
+          {"noisy sphere", NoisySphere(random)}};
 }
 
 std::array<Point, 3> Corners(const Mesh& mesh, uint32_t t) {
-  std::array<Point, 3> corners{};
-  for (size_t i = 0; i < 3; ++i) {
-    const Vertex& vertex = mesh.vertices[mesh.triangles[t][i]];
-    corners[i] = {vertex[0], vertex[1], vertex[2]};
-  }
-  return corners;
+  const Triangle& triangle = mesh.triangles[t];
+  return {mesh.At(triangle, {1, 0, 0}), mesh.At(triangle, {0, 1, 0}), mesh.At(triangle, {0, 0, 1})};
+}
+
+/// A locator of a surface that is its own given one. Both arguments must outlive it.
+std::unique_ptr<SurfaceLocator> LocatorOf(const Mesh& mesh, const std::vector<uint32_t>& given) {
+  return SurfaceLocator::Make({mesh.vertices, mesh.triangles, given, mesh.vertices, mesh.triangles})
+      .value();
 }
 
 /// A point of a random triangle: its inside, an edge, a corner, or one in single precision.
 Point OnSurface(const Mesh& mesh, std::mt19937& random) {
   std::uniform_int_distribution<uint32_t> any(0, static_cast<uint32_t>(mesh.triangles.size()) - 1);
   std::uniform_real_distribution<double> share(0, 1);
-  const std::array<Point, 3> corners = Corners(mesh, any(random));
+  const Triangle& triangle = mesh.triangles[any(random)];
   const uint32_t kind = any(random) % 4;
   const double v = kind == 2 ? 0 : share(random), w = kind > 0 ? 0 : share(random) * (1 - v);
-  Point point{};
-  for (size_t axis = 0; axis < 3; ++axis) {
-    point[axis] = (1 - v - w) * corners[0][axis] + v * corners[1][axis] + w * corners[2][axis];
-    if (kind == 3) point[axis] = static_cast<float>(point[axis]);
-  }
+  Point point = mesh.At(triangle, {1 - v - w, v, w});
+  for (double& x : point) x = kind == 3 ? static_cast<float>(x) : x;
   return point;
 }
 
@@ -207,12 +151,7 @@ LocatedPoint SearchAll(const Mesh& mesh, const Point& point) {
 /// Compares the answers for points at `away` times the body's size from its surface.
 void Compare(const std::string& name, const Mesh& mesh, double away, int count) {
   const std::vector<uint32_t> given(mesh.triangles.size());
-  const auto locator = SurfaceLocator::Make({.vertices = mesh.vertices,
-                                             .triangles = mesh.triangles,
-                                             .given_triangle = given,
-                                             .given_vertices = mesh.vertices,
-                                             .given_triangles = mesh.triangles})
-                           .value();
+  const auto locator = LocatorOf(mesh, given);
   const double size = SurfaceGrid(mesh.vertices, mesh.triangles).longest_side_m();
   std::mt19937 random(11);
   std::uniform_real_distribution<double> offset(-away * size, away * size);
@@ -241,29 +180,8 @@ TEST(SurfaceGrid, FindsOfEverySurfaceExactlyWhatASearchOfAllTrianglesFinds) {
   }
 }
 
-TEST(SurfaceGrid, TheCellsAboutAPointHoldEveryTriangleThatIsNear) {
-  for (const auto& [name, mesh] : Meshes()) {
-    const SurfaceGrid grid(mesh.vertices, mesh.triangles);
-    ASSERT_TRUE(grid.usable()) << name;
-    std::mt19937 random(3);
-    for (int i = 0; i < 50; ++i) {
-      const Point point = OnSurface(mesh, random);
-      const double radius = grid.cell_width_m();
-      std::vector<bool> visited(mesh.triangles.size());
-      const auto note = [&visited](std::span<const uint32_t> cell) {
-        for (const uint32_t t : cell) visited[t] = true;
-      };
-      if (!grid.Visit(grid.Around(point, radius), note)) continue;
-      for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-        const double squared = FindClosestPoint(Corners(mesh, t), point).squared_distance_m2;
-        EXPECT_TRUE(visited[t] || squared > 0.999 * radius * radius) << name << " " << t;
-      }
-    }
-  }
-}
-
 TEST(SurfaceGrid, ASurfaceThatIsNotFiniteOrADotHasNoCells) {
-  Mesh mesh = Box(1, 1, 1);
+  Mesh mesh = MakeBox(1, 1, 1);
   mesh.vertices[3][1] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_FALSE(SurfaceGrid(mesh.vertices, mesh.triangles).usable());
   mesh.vertices.assign(8, {1, 2, 3});
@@ -271,11 +189,9 @@ TEST(SurfaceGrid, ASurfaceThatIsNotFiniteOrADotHasNoCells) {
 }
 
 TEST(SurfaceGrid, APointFarFromABodyOfFewCellsIsFoundUntilItsDistanceOverflows) {
-  const Mesh mesh = Box(1, 1, 1);
+  const Mesh mesh = MakeBox(1, 1, 1);
   const std::vector<uint32_t> given(mesh.triangles.size());
-  const auto locator =
-      SurfaceLocator::Make({mesh.vertices, mesh.triangles, given, mesh.vertices, mesh.triangles})
-          .value();
+  const auto locator = LocatorOf(mesh, given);
   EXPECT_FALSE(locator->Nearest({1e200, 0, 0}).ok());
   EXPECT_DOUBLE_EQ(locator->Nearest({1e6, 0.5, 0.5})->distance_m, 1e6 - 1);
 }
