@@ -3,21 +3,15 @@
 // The head that Debian's libmysofa1 brings, KEMAR, beside the library's own filters.
 #include "server/scene/head_store.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mysofa.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <numbers>
-#include <numeric>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -36,14 +30,18 @@ Vector3 At(double degrees_to_the_right, double degrees_up = 0) {
           -std::cos(elevation) * std::cos(azimuth)};
 }
 
-template <class Taps>
-double LevelAt(const Taps& taps, double frequency_hz, double rate_hz) {
-  std::complex<double> sum = 0;
-  for (size_t n = 0; n < taps.size(); ++n) {
-    sum += double{taps[n]} *
-           std::polar(1.0, -2 * kPi * frequency_hz / rate_hz * static_cast<double>(n));
+std::complex<double> ResponseAt(std::span<const float> taps, double frequency_hz, double rate_hz) {
+  const std::complex<double> turn = std::polar(1.0, -2 * kPi * frequency_hz / rate_hz);
+  std::complex<double> sum = 0, phase = 1;
+  for (const float tap : taps) {
+    sum += double{tap} * phase;
+    phase *= turn;
   }
-  return 20 * std::log10(std::abs(sum));
+  return sum;
+}
+
+double LevelAt(std::span<const float> taps, double frequency_hz, double rate_hz) {
+  return 20 * std::log10(std::abs(ResponseAt(taps, frequency_hz, rate_hz)));
 }
 
 TEST(HeadStoreTest, EarsHearAsLateAsSoundTakesAroundAHead) {
@@ -58,49 +56,13 @@ TEST(HeadStoreTest, EarsHearAsLateAsSoundTakesAroundAHead) {
   }
 }
 
-TEST(HeadStoreTest, ResponsesAreThoseOfTheFile) {
-  int error = 0;
-  const std::unique_ptr<MYSOFA_HRTF, decltype(&mysofa_free)> file(mysofa_load(kKemar, &error),
-                                                                  &mysofa_free);
-  ASSERT_TRUE(file);
-  mysofa_tocartesian(file.get());
-  const auto head = *HeadStore(kKemar).Get(44100);
-  std::vector<double> differences;
-  for (size_t i = 0; i < file->M; ++i) {
-    const float* const at = &file->SourcePosition.values[3 * i];
-    if (std::abs(at[2]) > 1e-3) continue;  // those at the height of the ears are 5 degrees apart
-    EarResponses responses = head->Silent();
-    head->Respond({-at[1], at[2], -at[0]}, responses);
-    for (const size_t ear : {0U, 1U}) {
-      const std::span<const float> whole(&file->DataIR.values[(2 * i + ear) * file->N], file->N);
-      for (const double frequency_hz : {300.0, 1000.0, 3000.0, 6000.0, 10000.0}) {
-        differences.push_back(LevelAt(responses[ear].taps, frequency_hz, 44100) -
-                              LevelAt(whole, frequency_hz, 44100));
-      }
-    }
-  }
-  ASSERT_EQ(differences.size(), 72 * 2 * 5);
-  // One factor for all of them.
-  const auto count = static_cast<double>(differences.size());
-  const double mean = std::accumulate(differences.begin(), differences.end(), 0.0) / count;
-  double square = 0;
-  for (const double difference : differences) square += (difference - mean) * (difference - mean);
-  EXPECT_LT(std::sqrt(square / count), 0.3) << "dB";
-}
-
 using Spectrum = std::vector<std::complex<double>>;
 
 /// Each 200 Hz up to 16 kHz.
 Spectrum SpectrumOf(std::span<const float> sound, double rate_hz) {
   Spectrum spectrum;
   for (double frequency_hz = 200; frequency_hz <= 16000; frequency_hz += 200) {
-    const std::complex<double> turn = std::polar(1.0, -2 * kPi * frequency_hz / rate_hz);
-    std::complex<double> sum = 0, phase = 1;
-    for (const float sample : sound) {
-      sum += double{sample} * phase;
-      phase *= turn;
-    }
-    spectrum.push_back(sum);
+    spectrum.push_back(ResponseAt(sound, frequency_hz, rate_hz));
   }
   return spectrum;
 }
@@ -173,7 +135,7 @@ TEST(HeadStoreTest, AClickIsHeardThroughTheFiltersOfTheLibrary) {
         mysofa_open(kKemar, static_cast<float>(rate_hz), &length, &error), &mysofa_close);
     ASSERT_TRUE(library);
     Fit fit;  // one for all directions and both ears
-    for (int degrees = 0; degrees < 360; degrees += 15) {
+    for (int degrees = 0; degrees < 360; degrees += 5) {
       const Vector3 at = At(degrees);
       const auto heard = HearClick(head, at, rate_hz);
       std::array<std::vector<float>, 2> filters;
@@ -187,7 +149,9 @@ TEST(HeadStoreTest, AClickIsHeardThroughTheFiltersOfTheLibrary) {
         const Spectrum sound = SpectrumOf(heard[ear], rate_hz);
         const Spectrum filter = SpectrumOf(filters[ear], rate_hz);
         if (fit.gain == 0) fit = FitTo(sound, filter, rate_hz);
-        EXPECT_LT(ErrorOf(sound, filter, fit, rate_hz), -60) << degrees << ", ear " << ear;
+        // Every 15 degrees the error is smaller than between them.
+        EXPECT_LT(ErrorOf(sound, filter, fit, rate_hz), degrees % 15 == 0 ? -60 : -54)
+            << degrees << ", ear " << ear << ", " << rate_hz << " Hz";
       }
     }
   }

@@ -5,9 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <map>
-#include <string>
 #include <vector>
 
 namespace carillon {
@@ -82,6 +80,17 @@ class Falls {
   int lift_count_ = 0;
 };
 
+MomentumBalance::Report ReportOf(uint32_t handle, const Vector3& impulse, uint32_t vertex = 0,
+                                 MomentumBalance::Role role = MomentumBalance::Role::kOnly) {
+  return {.handle = handle,
+          .mass_kg = kMassKg,
+          .impulse_newton_seconds = {static_cast<float>(impulse[0]), static_cast<float>(impulse[1]),
+                                     static_cast<float>(impulse[2])},
+          .vertices = {vertex, 0, 0},
+          .weights = {1, 0, 0},
+          .role = role};
+}
+
 EngineMistakes Mistakes(const std::vector<Told>& steps, double rate_hz, double mass_kg = kMassKg,
                         bool wrong_frame = false) {
   MomentumBalance balance(1 / rate_hz, false);
@@ -89,12 +98,10 @@ EngineMistakes Mistakes(const std::vector<Told>& steps, double rate_hz, double m
     const Told& told = steps[k];
     balance.Move(1, told.position, told.orientation);
     for (const Vector3& impulse : told.impulses) {
-      const Vector3 local = wrong_frame ? impulse : Rotated(impulse, Inverse(told.orientation));
-      balance.Touch(
-          {.handle = 1,
-           .mass_kg = mass_kg,
-           .impulse_newton_seconds = {static_cast<float>(local[0]), static_cast<float>(local[1]),
-                                      static_cast<float>(local[2])}});
+      MomentumBalance::Report report =
+          ReportOf(1, wrong_frame ? impulse : Rotated(impulse, Inverse(told.orientation)));
+      report.mass_kg = mass_kg;
+      balance.Touch(report);
     }
     if (told.empty) balance.TouchWithout(1);
     balance.EndStep(static_cast<double>(k) / rate_hz);
@@ -117,13 +124,6 @@ using testing::Key;
 
 constexpr double kRates[] = {60, 144, 240, 1000};
 
-std::vector<Told> Changed(std::vector<Told> steps, const std::function<void(Vector3&)>& change) {
-  for (Told& told : steps) {
-    for (Vector3& impulse : told.impulses) change(impulse);
-  }
-  return steps;
-}
-
 TEST(MomentumBalance, ARightSimulationHasNoMistake) {
   for (const double rate_hz : kRates) {
     for (const int substeps : {1, 4}) {
@@ -145,11 +145,11 @@ TEST(MomentumBalance, NamesARatioAndItsSize) {
   for (const double rate_hz : kRates) {
     const std::vector<Told> right = Falls(rate_hz).Steps(8);
     const auto scaled = [&](double by) {
-      return Named(Mistakes(Changed(right,
-                                    [by](Vector3& v) {
-                                      v = {by * v[0], 0, by * v[2]};
-                                    }),
-                            rate_hz));
+      std::vector<Told> steps = right;
+      for (Told& told : steps) {
+        for (Vector3& impulse : told.impulses) impulse = {by * impulse[0], 0, by * impulse[2]};
+      }
+      return Named(Mistakes(steps, rate_hz));
     };
     const auto only = [](EngineMistake mistake, double ratio) {
       return ElementsAre(testing::Pair(mistake, testing::DoubleNear(ratio, 0.1 * std::abs(ratio))));
@@ -241,11 +241,7 @@ TEST(MomentumBalance, WithoutPosesItNamesForcesAndEqualContacts) {
       for (int k = 0; k < 240; ++k) {
         for (uint32_t corner = 0; corner < 4; ++corner) {
           for (int i = 0; i < times; ++i) {
-            balance.Touch({.handle = 1,
-                           .mass_kg = kMassKg,
-                           .impulse_newton_seconds = {0, 0, static_cast<float>(impulse / 4)},
-                           .vertices = {corner, 0, 0},
-                           .weights = {1, 0, 0}});
+            balance.Touch(ReportOf(1, {0, 0, impulse / 4}, corner));
           }
         }
         balance.EndStep(k / rate_hz);
@@ -265,24 +261,16 @@ TEST(MomentumBalance, NamesContactsOfTwoObjectsFromBothSidesBesideRightOnesWithA
   const auto balanced = [](bool mirrors) {
     MomentumBalance balance(1 / 240.0, false);
     for (int k = 0; k < 240; ++k) {
-      const auto touch = [&](uint32_t handle, uint32_t vertex, double impulse,
-                             MomentumBalance::Role role) {
-        balance.Touch({.handle = handle,
-                       .mass_kg = kMassKg,
-                       .impulse_newton_seconds = {0, 0, static_cast<float>(impulse)},
-                       .vertices = {vertex, 0, 0},
-                       .weights = {1, 0, 0},
-                       .role = role});
-      };
-      for (uint32_t corner = 0; corner < 4; ++corner)
-        touch(1, corner, 0.004 + 0.001 * corner, kOnly);
+      for (uint32_t corner = 0; corner < 4; ++corner) {
+        balance.Touch(ReportOf(1, {0, 0, 0.004 + 0.001 * corner}, corner));
+      }
       if (k % 60 == 30) {
-        touch(1, 7, -0.3, kFirst);
-        touch(2, 5, 0.3, kSecond);
-        if (mirrors) {
-          touch(2, 5, 0.3, kFirst);
-          touch(1, 7, -0.3, kSecond);
-        }
+        balance.Touch(ReportOf(1, {0, 0, -0.3}, 7, kFirst));
+        balance.Touch(ReportOf(2, {0, 0, 0.3}, 5, kSecond));
+      }
+      if (k % 60 == 30 && mirrors) {
+        balance.Touch(ReportOf(2, {0, 0, 0.3}, 5, kFirst));
+        balance.Touch(ReportOf(1, {0, 0, -0.3}, 7, kSecond));
       }
       balance.EndStep(k / 240.0);
     }

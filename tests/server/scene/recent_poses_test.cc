@@ -23,6 +23,10 @@ class RecentPosesTest : public testing::Test {
   void MoveTo(double height_m, uint64_t serial = 1) {
     poses_.Move(3, serial, {.position_m = {0, 0, height_m}});
   }
+  void BeginAt(int step, double height_m, uint64_t serial = 1) {
+    Begin(step);
+    MoveTo(height_m, serial);
+  }
   std::optional<double> Approach(const RecentPoses::Ray& ray = kUpwards) const {
     return poses_.ApproachSpeed(std::span(&ray, 1));
   }
@@ -31,21 +35,15 @@ class RecentPosesTest : public testing::Test {
 };
 
 TEST_F(RecentPosesTest, ABodyThatIsStoppedApproachedAsFastAsTheStepWouldHaveMadeIt) {
-  for (int step = 1; step <= 12; ++step) {
-    Begin(step);
-    MoveTo(HeightM(step));
-  }
-  Begin(13);
-  MoveTo(HeightM(12));  // the engine tells the pose after the step, in which the body has stopped
+  for (int step = 1; step <= 12; ++step) BeginAt(step, HeightM(step));
+  // The engine tells the pose after the step, in which the body has stopped.
+  BeginAt(13, HeightM(12));
   ASSERT_TRUE(Approach());
   EXPECT_NEAR(*Approach(), SpeedMPerS(13), 1e-9);
 }
 
 TEST_F(RecentPosesTest, PosesBeforeTheStepGiveTheSameSpeed) {
-  for (int step = 1; step <= 13; ++step) {
-    Begin(step);
-    MoveTo(HeightM(step - 1));
-  }
+  for (int step = 1; step <= 13; ++step) BeginAt(step, HeightM(step - 1));
   EXPECT_NEAR(*Approach(), SpeedMPerS(13), 1e-9);
 }
 
@@ -67,8 +65,7 @@ TEST_F(RecentPosesTest, ThePointsOfATurningBodyDifferInSpeed) {
 
 TEST_F(RecentPosesTest, TwoBodiesApproachByTheSumOfTheirSpeeds) {
   for (int step = 1; step <= 5; ++step) {
-    Begin(step);
-    MoveTo(-0.1 * step);
+    BeginAt(step, -0.1 * step);
     poses_.Move(4, 2, {.position_m = {0, 0, 0.05 * step}, .orientation = {.w = 0, .x = 1}});
   }
   // The second body lies on its back, so that its own axis z points down.
@@ -78,10 +75,7 @@ TEST_F(RecentPosesTest, TwoBodiesApproachByTheSumOfTheirSpeeds) {
 }
 
 TEST_F(RecentPosesTest, ABodyWithoutPosesIsAtRestIfTheOtherHasPoses) {
-  for (int step = 1; step <= 5; ++step) {
-    Begin(step);
-    MoveTo(-0.1 * step);
-  }
+  for (int step = 1; step <= 5; ++step) BeginAt(step, -0.1 * step);
   const RecentPoses::Ray fixed{.handle = 9, .direction = {0, 0, -1}};
   const std::array<RecentPoses::Ray, 2> rays{kUpwards, fixed};
   EXPECT_NEAR(*poses_.ApproachSpeed(rays), 0.1 / kStepS, 1e-9);
@@ -97,22 +91,15 @@ TEST_F(RecentPosesTest, ABodyKeepsItsPoseInStepsWithoutOne) {
 }
 
 TEST_F(RecentPosesTest, TheFirstStepsOfABodyAndThoseAfterAGapTellNothing) {
-  Begin(1);
-  MoveTo(1);
+  BeginAt(1, 1);
   EXPECT_FALSE(Approach());
-  Begin(2);
-  MoveTo(0.9);
+  BeginAt(2, 0.9);
   EXPECT_FALSE(Approach());
-  Begin(3);
-  MoveTo(0.8);
+  BeginAt(3, 0.8);
   EXPECT_NEAR(*Approach(), 0.1 / kStepS, 1e-9);
-  Begin(4);
-  MoveTo(0.7, 2);  // another object with the handle
+  BeginAt(4, 0.7, 2);  // another object with the handle
   EXPECT_FALSE(Approach());
-  for (int step = 5; step <= 8; ++step) {
-    Begin(step);
-    MoveTo(0, 2);
-  }
+  for (int step = 5; step <= 8; ++step) BeginAt(step, 0, 2);
   EXPECT_TRUE(Approach());
   Begin(20, false);
   MoveTo(-1, 2);
@@ -120,10 +107,7 @@ TEST_F(RecentPosesTest, TheFirstStepsOfABodyAndThoseAfterAGapTellNothing) {
 }
 
 TEST_F(RecentPosesTest, StepsAtOneTimeTellNothing) {
-  for (int i = 0; i < 4; ++i) {
-    Begin(7);
-    MoveTo(-0.1 * i);
-  }
+  for (int i = 0; i < 4; ++i) BeginAt(7, -0.1 * i);
   EXPECT_FALSE(Approach());
 }
 

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "server/scene/contact_intake.h"
-#include "server/scene/scene_registry.h"
-#include "tests/server/scene/small_model.h"
+#include "tests/server/scene/stage.h"
 
 namespace carillon {
 
@@ -23,21 +22,15 @@ class RecordingTarget final : public EventTarget {
 };
 
 /// A scene with two objects, and a target of the events that its contacts become.
-class RecordedSceneTest : public testing::Test {
+class RecordedSceneTest : public testing::Test, protected Stage {
  protected:
   RecordedSceneTest() {
-    for (const uint32_t handle : {1U, 2U}) Insert(handle, SmallModel());
+    for (const uint32_t handle : {1U, 2U}) EXPECT_TRUE(scene_.Insert(handle, Made()).ok());
   }
 
-  void Insert(uint32_t handle, const std::shared_ptr<const ModalModel>& model) {
-    const auto placed = scenes_.AddObject(registered_, handle, model, SmallProperties());
-    ASSERT_TRUE(scene_.Insert(handle, placed->object).ok());
-  }
+  SoundingObject Made() { return TryAdd(SmallProperties())->object; }
 
-  Mixer mixer_;
-  SceneRegistry scenes_{mixer_};
   Scene scene_{"a scene"};
-  const uint64_t registered_ = *scenes_.CreateScene();
   RecordingTarget target_;
 };
 

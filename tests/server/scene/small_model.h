@@ -5,7 +5,6 @@
 #include <memory>
 #include <numbers>
 #include <string>
-#include <vector>
 
 #include "server/mode_database/codec/modal_model.h"
 #include "server/scene/object_contact.h"

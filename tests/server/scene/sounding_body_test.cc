@@ -4,11 +4,8 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
-#include <memory>
-
 #include "server/scene/body_impulses.h"
-#include "server/scene/scene_registry.h"
-#include "tests/server/scene/small_model.h"
+#include "tests/server/scene/stage.h"
 
 namespace carillon {
 namespace {
@@ -37,11 +34,10 @@ TEST(BodyCache, KeepsNoMemoryOfBodiesThatNobodyUses) {
 }
 
 TEST(SoundingObject, APointIsInMetresOfTheObjectAsLargeAsItIs) {
-  Mixer mixer;
-  SceneRegistry scenes(mixer);
+  Stage stage;
   ObjectProperties properties = SmallProperties();
   properties.material.size = 3;
-  const PlacedObject placed = *scenes.AddObject(*scenes.CreateScene(), 0, SmallModel(), properties);
+  const PlacedObject placed = *stage.TryAdd(properties);
   ObjectContact contact = SmallImpulse(1).contact;
   // Half way up an edge of 0.3 m, from vertex 0 to vertex 2.
   contact.impulse.location = Point{0, 0.15, 0};
