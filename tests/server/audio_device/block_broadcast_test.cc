@@ -17,12 +17,13 @@ class BlockBroadcastTest : public testing::Test {
     return *broadcast_.Subscribe([this] { ++wake_count_; });
   }
 
-  void Publish(int block_count) {
+  void PublishAndDeliver(int block_count) {
     for (int i = 0; i < block_count; ++i) {
       const std::vector<float> samples(kBlock, static_cast<float>(next_block_));
       broadcast_.Publish(next_block_ * kBlock, samples);
       ++next_block_;
     }
+    broadcast_.Deliver();
   }
 
   /// First frames of all blocks that wait.
@@ -44,10 +45,8 @@ class BlockBroadcastTest : public testing::Test {
 TEST_F(BlockBroadcastTest, EveryListenerHearsEveryBlock) {
   const auto one = Listen();
   const auto two = Listen();
-  Publish(2);
-  broadcast_.Deliver();
-  Publish(1);
-  broadcast_.Deliver();
+  PublishAndDeliver(2);
+  PublishAndDeliver(1);
   EXPECT_THAT(TakeAll(*one), testing::ElementsAre(0, 4, 8));
   EXPECT_THAT(TakeAll(*two), testing::ElementsAre(0, 4, 8));
   EXPECT_EQ(wake_count_, 4);
@@ -57,8 +56,7 @@ TEST_F(BlockBroadcastTest, OneThatDoesNotReadLosesWholeBlocksAndIsTold) {
   const auto slow = Listen();
   const auto quick = Listen();
   for (int i = 0; i < 5; ++i) {
-    Publish(1);
-    broadcast_.Deliver();
+    PublishAndDeliver(1);
     EXPECT_EQ(TakeAll(*quick).size(), 1U);
   }
   EXPECT_THAT(TakeAll(*slow), testing::ElementsAre(0, 4, 8));
@@ -68,13 +66,10 @@ TEST_F(BlockBroadcastTest, OneThatDoesNotReadLosesWholeBlocksAndIsTold) {
 
 TEST_F(BlockBroadcastTest, WhatCouldNotBeDeliveredInTimeIsCountedAsLost) {
   const auto listener = Listen();
-  Publish(1);
-  broadcast_.Deliver();
-  Publish(5);  // the ring holds three
-  broadcast_.Deliver();
+  PublishAndDeliver(1);
+  PublishAndDeliver(5);  // the ring holds three
   EXPECT_THAT(TakeAll(*listener), testing::ElementsAre(0, 4, 8));
-  Publish(1);
-  broadcast_.Deliver();
+  PublishAndDeliver(1);
   EXPECT_THAT(TakeAll(*listener), testing::ElementsAre(24));
   EXPECT_EQ(listener->lost_frame_count(), 3 * kBlock);
 }

@@ -5,7 +5,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sndfile.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,29 +19,44 @@
 #include <vector>
 
 #include "server/live_output/live_output.h"
-#include "server/scene/scene_registry.h"
-#include "tests/server/audio_device/child.h"
+#include "tests/server/audio_device/wav.h"
 #include "tests/server/mode_database/sample_model.h"
-#include "tests/server/scene/small_model.h"
+#include "tests/server/scene/stage.h"
 
 namespace carillon {
 namespace {
 
-/// A JACK server that nobody else uses, in real time but without hardware.
+/// Runs a program silently. Returns whether it succeeded.
+bool Succeeds(const std::string& command) {
+  return std::system((command + " < /dev/null > /dev/null 2>&1").c_str()) == 0;
+}
+
+/// A JACK server that nobody else uses, in real time but without hardware. It ends with the test at
+/// the latest.
 class JackServer {
  public:
   JackServer() {
     setenv("JACK_DEFAULT_SERVER", ("carillon-test-" + std::to_string(getpid())).c_str(), 1);
     setenv("JACK_NO_AUDIO_RESERVATION", "1", 1);
     setenv("JACK_NO_START_SERVER", "1", 1);
-    server_.emplace(std::vector<std::string>{"jackd", "-R", "-P", "50", "-d", "dummy", "-r",
-                                             "48000", "-p", "128"});
-    runs_ = Child({"jack_wait", "-w", "-t", "10"}).Wait() == 0;
+    process_ = fork();
+    if (process_ == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
+      const char* command =
+          "exec jackd -R -P 50 -d dummy -r 48000 -p 128 < /dev/null > /dev/null 2>&1";
+      execl("/bin/sh", "sh", "-c", command, nullptr);
+      _exit(127);
+    }
+    runs_ = Succeeds("jack_wait -w -t 10");
+  }
+  ~JackServer() {
+    kill(process_, SIGTERM);
+    waitpid(process_, nullptr, 0);
   }
   bool runs() const { return runs_; }
 
  private:
-  std::optional<Child> server_;
+  pid_t process_ = -1;
   bool runs_ = false;
 };
 
@@ -78,20 +95,8 @@ void StrikeForAWhile(SceneRegistry& scenes) {
   ASSERT_TRUE(scenes.AddObject(scene, 1, SmallModel(), SmallProperties()).ok());
   const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.1});
   for (int step = 0; step < 60; ++step) {
-    ASSERT_TRUE(stream->intake().BeginStep(0.1 * step).ok());
-    stream->intake().Strike(SmallImpulse(1, 0.5 + 0.01 * step));
-    stream->intake().EndStep();
+    StrikeAt(stream->intake(), 0.1 * step, {SmallImpulse(1, 0.5 + 0.01 * step)});
   }
-}
-
-std::vector<float> ReadWav(const std::string& path) {
-  SF_INFO info{};
-  SNDFILE* file = sf_open(path.c_str(), SFM_READ, &info);
-  if (file == nullptr) return {};
-  std::vector<float> samples(static_cast<size_t>(info.frames * info.channels));
-  sf_readf_float(file, samples.data(), info.frames);
-  sf_close(file);
-  return samples;
 }
 
 const OutputSettings kSettings{.device = "portaudio:JACK Audio Connection Kit",
@@ -117,12 +122,10 @@ TEST(JackDevice, PlaysBitForBitWhatListenersHear) {
   SceneRegistry scenes((*output)->mixer());
   StrikeForAWhile(scenes);
   const std::string file = folder / "capture.wav";
-  if (Child({"jack_capture", "--daemon", "-c", "1", "-b", "FLOAT", "-p", "PortAudio:out_0", "-d",
-             "2", file})
-          .Wait() != 0) {
+  if (!Succeeds("jack_capture --daemon -c 1 -b FLOAT -p PortAudio:out_0 -d 2 " + file)) {
     GTEST_SKIP() << "jack_capture cannot run here";
   }
-  const std::vector<float> captured = ReadWav(file);
+  const std::vector<float> captured = ReadWav(file).samples;
   const std::vector<float> listened = recorder.sound();
   if (const uint64_t xrun_count = (*output)->state().xrun_count; xrun_count > 0) {
     GTEST_SKIP() << "this machine is too busy for sound: " << xrun_count << " xruns";

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <numeric>
 #include <vector>
 
@@ -11,8 +10,6 @@
 
 namespace carillon {
 namespace {
-
-constexpr DeviceFormat kFormat{.sample_rate_hz = 48000, .block_frame_count = 16};
 
 /// Blocks whose samples count frames from 1.
 class Ramp {
@@ -26,70 +23,51 @@ class Ramp {
   size_t next_ = 1;
 };
 
-TEST(LookAhead, IsFullBeforeTheFirstPull) {
-  ManualClock clock;
-  LookAhead look_ahead(kFormat, 4, Ramp(), clock);
-  look_ahead.Start().IgnoreError();
-  look_ahead.Stop();
-  std::vector<float> frames(64);
-  look_ahead.source().Pull(frames);
-  for (size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(frames[i], static_cast<float>(i + 1));
-  EXPECT_EQ(look_ahead.xrun_count(), 0U);
-}
+/// A look-ahead of four blocks, which its thread has filled.
+class LookAheadTest : public testing::TestWithParam<uint32_t> {
+ protected:
+  ManualClock clock_;
+  const uint32_t channel_count_ = GetParam();
+  LookAhead look_ahead_{
+      {.sample_rate_hz = 48000, .block_frame_count = 16, .channel_count = channel_count_},
+      4,
+      Ramp(),
+      clock_};
+};
 
-TEST(LookAhead, CountsWhatItCouldNotGiveAndGivesSilence) {
-  ManualClock clock;
-  LookAhead look_ahead(kFormat, 4, Ramp(), clock);
-  look_ahead.Start().IgnoreError();
-  look_ahead.Stop();
-  std::vector<float> frames(64);
-  look_ahead.source().Pull(frames);
-  std::vector<float> rest(100, 7.0F);
-  while (look_ahead.xrun_count() == 0)
-    look_ahead.source().Pull(rest);  // the thread may have run once more
-  EXPECT_EQ(rest.back(), 0.0F);
-  EXPECT_EQ(look_ahead.xrun_count(), 1U);
-  EXPECT_GT(look_ahead.lost_frame_count(), 0U);
-  EXPECT_LE(look_ahead.lost_frame_count(), 100U);
-}
+INSTANTIATE_TEST_SUITE_P(MonoAndStereo, LookAheadTest, testing::Values(1U, 2U));
 
-TEST(LookAhead, LosesNoFrameBetweenRendererAndDevice) {
-  ManualClock clock;
-  LookAhead look_ahead(kFormat, 4, Ramp(), clock);
-  look_ahead.Start().IgnoreError();
-  std::vector<float> heard;
-  std::vector<float> frames(24);
-  while (heard.size() < 4800) {
-    const uint64_t lost = look_ahead.lost_frame_count();
-    look_ahead.source().Pull(frames);
-    const size_t given = frames.size() - (look_ahead.lost_frame_count() - lost);
-    heard.insert(heard.end(), frames.begin(), frames.begin() + static_cast<ptrdiff_t>(given));
+TEST_P(LookAheadTest, IsFullBeforeTheFirstPullAndThenCountsTheFramesThatItCouldNotGive) {
+  EXPECT_DOUBLE_EQ(look_ahead_.latency_s(), 4 * 16 / 48000.0);
+  look_ahead_.Start().IgnoreError();
+  look_ahead_.Stop();
+  std::vector<float> samples(size_t{64} * channel_count_);
+  look_ahead_.source().Pull(samples);
+  for (size_t i = 0; i < samples.size(); ++i) EXPECT_EQ(samples[i], static_cast<float>(i + 1));
+  EXPECT_EQ(look_ahead_.xrun_count(), 0U);
+  std::vector<float> rest(size_t{100} * channel_count_, 7.0F);
+  while (look_ahead_.xrun_count() == 0) {
+    look_ahead_.source().Pull(rest);  // the thread may have run once more
   }
-  look_ahead.Stop();
+  EXPECT_EQ(rest.back(), 0.0F);
+  EXPECT_EQ(look_ahead_.xrun_count(), 1U);
+  EXPECT_GT(look_ahead_.lost_frame_count(), 0U);
+  EXPECT_LE(look_ahead_.lost_frame_count(), 100U);
+}
+
+TEST_P(LookAheadTest, LosesNoFrameBetweenRendererAndDevice) {
+  look_ahead_.Start().IgnoreError();
+  std::vector<float> heard;
+  std::vector<float> samples(size_t{24} * channel_count_);
+  while (heard.size() < size_t{4800} * channel_count_) {
+    const uint64_t lost = look_ahead_.lost_frame_count();
+    look_ahead_.source().Pull(samples);
+    const uint64_t given = 24 - (look_ahead_.lost_frame_count() - lost);
+    heard.insert(heard.end(), samples.begin(),
+                 samples.begin() + static_cast<ptrdiff_t>(given * channel_count_));
+  }
+  look_ahead_.Stop();
   for (size_t i = 0; i < heard.size(); ++i) ASSERT_EQ(heard[i], static_cast<float>(i + 1));
-}
-
-TEST(LookAhead, InStereoCountsFramesNotSamples) {
-  DeviceFormat stereo = kFormat;
-  stereo.channel_count = 2;
-  ManualClock clock;
-  LookAhead look_ahead(stereo, 4, Ramp(), clock);
-  EXPECT_DOUBLE_EQ(look_ahead.latency_s(), 4 * 16 / 48000.0);
-  look_ahead.Start().IgnoreError();
-  look_ahead.Stop();
-  std::vector<float> samples(2 * 64);
-  look_ahead.source().Pull(samples);
-  EXPECT_EQ(samples.back(), 128);
-  std::vector<float> rest(2 * 100);
-  while (look_ahead.xrun_count() == 0)
-    look_ahead.source().Pull(rest);  // the thread may have run once more
-  EXPECT_LE(look_ahead.lost_frame_count(), 100U);
-}
-
-TEST(LookAhead, StatesTheLatencyItAdds) {
-  ManualClock clock;
-  const LookAhead look_ahead(kFormat, 6, Ramp(), clock);
-  EXPECT_DOUBLE_EQ(look_ahead.latency_s(), 6 * 16 / 48000.0);
 }
 
 }  // namespace

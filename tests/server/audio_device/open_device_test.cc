@@ -3,15 +3,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sndfile.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <latch>
-#include <vector>
+#include <memory>
+#include <string>
 
 #include "tests/server/audio_device/manual_clock.h"
+#include "tests/server/audio_device/wav.h"
 
 namespace carillon {
 namespace {
@@ -36,27 +36,8 @@ absl::StatusOr<std::unique_ptr<AudioDevice>> Open(const std::string& specificati
       clock);
 }
 
-struct Wav {
-  SF_INFO info{};
-  std::vector<float> samples;
-};
-
-Wav ReadWav(const std::string& path) {
-  Wav wav;
-  SNDFILE* file = sf_open(path.c_str(), SFM_READ, &wav.info);
-  EXPECT_NE(file, nullptr) << sf_strerror(nullptr);
-  wav.samples.resize(static_cast<size_t>(wav.info.frames));
-  sf_readf_float(file, wav.samples.data(), wav.info.frames);
-  sf_close(file);
-  return wav;
-}
-
-std::string TemporaryPath(const char* name) {
-  return (std::filesystem::path(testing::TempDir()) / name).string();
-}
-
 TEST(OpenDevice, FileDeviceWritesTheSamplesBitForBit) {
-  const std::string path = TemporaryPath("carillon_file_device.wav");
+  const std::string path = testing::TempDir() + "carillon_file_device.wav";
   ManualClock clock;
   OneOverN source;
   {
@@ -83,7 +64,7 @@ TEST(OpenDevice, KeepsAFileThatIsNoSound) {
   const std::string path = testing::TempDir() + "KeepsAFileThatIsNoSound.db";
   std::ofstream(path) << "SQLite format 3";
   const absl::Status status = Open("file:" + path, clock).status();
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_CONFIGURATION: \"" + path));
+  EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_CONFIGURATION: "));
   EXPECT_EQ(std::filesystem::file_size(path), 15U);
   std::filesystem::remove(path);
 }

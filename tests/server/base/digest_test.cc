@@ -19,8 +19,9 @@ TEST(Sha256, GivesTheDigestsOfTheStandard) {
 TEST(Sha256, DoesNotDependOnThePiecesInWhichBytesArrive) {
   const std::string bytes(100'000, 'x');
   Sha256 sha;
-  for (size_t at = 0; at < bytes.size(); at += 777)
+  for (size_t at = 0; at < bytes.size(); at += 777) {
     sha.Update(std::string_view(bytes).substr(at, 777));
+  }
   EXPECT_EQ(sha.Finish(), Sha256Hex(bytes));
 }
 

@@ -39,21 +39,14 @@ TEST_F(UsableMemory, IsTheMachinesWithoutAnyGroup) {
   EXPECT_GT(UsableMemoryBytes(), 64 * kMib);
 }
 
-TEST_F(UsableMemory, IsTheLimitOfTheGroupInVersion2) {
-  Write("cgroup", "0::/daemon");
-  Write("fs/daemon/memory.max", std::to_string(400 * kMib));
-  EXPECT_EQ(Bytes(), 400 * kMib);
-}
-
-TEST_F(UsableMemory, IsTheLeastLimitOfAllGroupsAbove) {
+TEST_F(UsableMemory, IsTheLeastLimitOfAllGroupsAboveInBothVersions) {
   Write("cgroup", "0::/slice/service/daemon");
+  Write("fs/slice/service/daemon/memory.max", std::to_string(400 * kMib));
+  EXPECT_EQ(Bytes(), 400 * kMib);
   Write("fs/slice/memory.max", std::to_string(300 * kMib));
   Write("fs/slice/service/memory.max", std::to_string(500 * kMib));
   Write("fs/slice/service/daemon/memory.max", "max");
   EXPECT_EQ(Bytes(), 300 * kMib);
-}
-
-TEST_F(UsableMemory, IsTheLimitOfTheGroupInVersion1) {
   Write("cgroup", "9:name=systemd:/\n4:cpu,memory:/docker/12ab\n0::/");
   Write("fs/memory/memory.limit_in_bytes", "9223372036854771712");
   Write("fs/memory/docker/12ab/memory.limit_in_bytes", std::to_string(250 * kMib));

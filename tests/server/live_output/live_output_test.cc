@@ -12,8 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "server/scene/scene_registry.h"
-#include "tests/server/scene/small_model.h"
+#include "tests/server/scene/stage.h"
 
 namespace carillon {
 namespace {
@@ -72,9 +71,7 @@ TEST_F(PausingOutputTest, AContactAfterAPauseSoundsInTime) {
     AwaitPause();
     const nanoseconds begin = clock_.Monotonic();
     const auto stream = *scenes.OpenContactStream(scene, {.step_s = 0.01});
-    ASSERT_TRUE(stream->intake().BeginStep(0).ok());
-    stream->intake().Strike(SmallImpulse(handle));
-    stream->intake().EndStep();
+    StrikeAt(stream->intake(), 0, {SmallImpulse(handle)});
     in_time = clock_.Monotonic() - begin < milliseconds(10);  // else the machine is too busy
     while (!stream->settled()) std::this_thread::yield();
     EXPECT_EQ(stream->counts().accepted_count + stream->counts().late_count, 1U);
