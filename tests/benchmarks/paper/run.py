@@ -23,6 +23,7 @@ import bench  # noqa: E402
 import bodies  # noqa: E402
 import programs  # noqa: E402
 import table2  # noqa: E402
+from bench import head, row as line  # noqa: E402
 
 
 def percent(value, reference):
@@ -37,31 +38,31 @@ def clock(seconds):
 
 
 def frequency_table(rows, linear, best):
-    yield from bench.head("row", "the paper, Hz", "linear, Hz (nodes, elements)", "quadratic, Hz (nodes, elements)",
+    yield from head("row", "the paper, Hz", "linear, Hz (nodes, elements)", "quadratic, Hz (nodes, elements)",
                     "estimated error", "size at which ours has the paper's frequency")
     for row in rows:
         low, high = linear[row.name], best[row.name]
         size = high.natural_hz / row.natural_hz
-        yield bench.row(row.name, f"{row.printed.damped_hz} ({row.printed.nodes})",
+        yield line(row.name, f"{row.printed.damped_hz} ({row.printed.nodes})",
                    f"{low.base['damped_frequency_hz']:.1f} ({low.nodes}, {low.elements})",
                    f"{high.base['damped_frequency_hz']:.1f} ({high.nodes}, {high.elements})",
                    f"{100 * high.base['estimated_error']:.2f} %", f"x {size:.3f}")
 
 
 def decay_table(rows, best):
-    yield from bench.head("row", "printed, 1/s", "from the printed frequency, 1/s", "ours, 1/s", "our T60, s")
+    yield from head("row", "printed, 1/s", "from the printed frequency, 1/s", "ours, 1/s", "our T60, s")
     for row in rows:
         decay = best[row.name].decay_per_s
-        yield bench.row(row.name, row.printed.decay_per_s, f"{row.material.decay_per_s(row.printed.damped_hz):.2f}",
+        yield line(row.name, row.printed.decay_per_s, f"{row.material.decay_per_s(row.printed.damped_hz):.2f}",
                    f"{decay:.2f}", f"{math.log(1000) / decay:.3g}")
 
 
 def time_table(rows, linear, best):
-    yield from bench.head("row", "method, paper", "time, paper", "modes to 20 kHz", "CPU s, linear", "times less",
+    yield from head("row", "method, paper", "time, paper", "modes to 20 kHz", "CPU s, linear", "times less",
                     "CPU s, quadratic (modes)")
     for row in rows:
         low, high = linear[row.name], best[row.name]
-        yield bench.row(row.name, row.printed.method, clock(row.printed.seconds), len(low.modes), f"{low.cpu_s:.2f}",
+        yield line(row.name, row.printed.method, clock(row.printed.seconds), len(low.modes), f"{low.cpu_s:.2f}",
                    f"{row.printed.seconds / low.cpu_s:,.0f}", f"{high.cpu_s:.2f} ({len(high.modes)})")
 
 
@@ -72,11 +73,11 @@ RATIOS = [("shelf (plastic)", "shelf (aluminum)"), ("shelf (wood)", "shelf (alum
 def ratio_table(rows, best):
     """Natural frequencies of rows that share a shape."""
     from errata import possible_ratio
-    yield from bench.head("rows", "the paper, damped as printed", "the paper, natural", "ours, natural", "possible")
+    yield from head("rows", "the paper, damped as printed", "the paper, natural", "ours, natural", "possible")
     for below, above in RATIOS:
         low, high = rows[below], rows[above]
         least, most = possible_ratio(low.material, high.material, 10 if below == "boxes" else 1)
-        yield bench.row(f"{below} : {above}", f"1 : {high.printed.damped_hz / low.printed.damped_hz:.4f}",
+        yield line(f"{below} : {above}", f"1 : {high.printed.damped_hz / low.printed.damped_hz:.4f}",
                    f"1 : {high.natural_hz / low.natural_hz:.4f}",
                    f"1 : {best[above].natural_hz / best[below].natural_hz:.4f}",
                    f"1 : {least:.4f} to {most:.4f}")
@@ -85,9 +86,9 @@ def ratio_table(rows, best):
 def chime_tables(solver, aluminum):
     """The lines of two tables, and the quadratic frequency of each chime at its measured length in Hz."""
     options = ["--keep-surface", "--band", "20:2500", *aluminum.options()]
-    first = bench.head("note", "length, m", "measured, Hz", "computed in the paper, Hz", "quadratic, Hz (nodes, CPU s)",
+    first = head("note", "length, m", "measured, Hz", "computed in the paper, Hz", "quadratic, Hz (nodes, CPU s)",
                  "from measured", "beam theory, Hz", "linear, Hz (nodes, CPU s)", "from the paper's")
-    second = bench.head("note", "ideal, Hz", "adjusted length, m", "the paper, Hz", "quadratic, Hz", "from the paper's",
+    second = head("note", "ideal, Hz", "adjusted length, m", "the paper, Hz", "quadratic, Hz", "from the paper's",
                   "`tune`: length, m", "from the paper's", "Hz", "from the ideal, Hz", "solves")
     found, tuned_to = {}, {}
     for note, (ideal, length, measured, computed, adjusted, tuned) in table2.CHIMES.items():
@@ -95,13 +96,13 @@ def chime_tables(solver, aluminum):
         linear = solver.solve(bodies.tube(length, 48, 195), f"{note}, linear", [*options, "--element", "linear"])
         other = solver.solve(bodies.tube(adjusted, 16, round(100 * adjusted)), f"{note}, adjusted", options)
         found[note] = best.natural_hz
-        first.append(bench.row(note, length, measured, computed, f"{best.natural_hz:.2f} ({best.nodes}, {best.cpu_s:.1f})",
+        first.append(line(note, length, measured, computed, f"{best.natural_hz:.2f} ({best.nodes}, {best.cpu_s:.1f})",
                           percent(best.natural_hz, measured), f"{table2.timoshenko_hz(length):.2f}",
                           f"{linear.natural_hz:.2f} ({linear.nodes}, {linear.cpu_s:.1f})",
                           percent(linear.natural_hz, computed)))
         ours = tune(solver.folder, note, length, ideal, options)
         tuned_to[note] = ours["frequency_hz"] - ideal
-        second.append(bench.row(note, ideal, adjusted, tuned, f"{other.natural_hz:.2f}", percent(other.natural_hz, tuned),
+        second.append(line(note, ideal, adjusted, tuned, f"{other.natural_hz:.2f}", percent(other.natural_hz, tuned),
                            f"{ours['length_m']:.4f}", f"{1000 * (ours['length_m'] - adjusted):+.1f} mm",
                            f"{ours['frequency_hz']:.2f}", f"{tuned_to[note]:+.2f}", ours["solves"]))
     return first, second, found, max(map(abs, tuned_to.values()))

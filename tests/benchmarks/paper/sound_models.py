@@ -10,6 +10,7 @@ import catalogue
 import mode_shapes
 import numpy
 import programs
+from bench import head, row as line
 
 RATE_HZ, SPAN_S, FULL_SCALE_PA, HEARD_PA = 48000, 3.0, 200.0, 20e-6
 CONTACT_S, IMPULSE_NS = 2e-4, 2e-3
@@ -103,7 +104,7 @@ def draw(made, path):
 def compare(solver, rows, picture, folder):
     """Draws the picture and leaves each sound in the folder. Returns the lines of the table."""
     import carillon
-    lines = bench.head("body", "sound model", "peak at 1 m, Pa", "exposure level, dB", "half of the energy below, Hz",
+    lines = head("body", "sound model", "peak at 1 m, Pa", "exposure level, dB", "half of the energy below, Hz",
                  "40 dB below after, s")
     pathlib.Path(folder).mkdir(parents=True, exist_ok=True)
     made = {}
@@ -111,7 +112,7 @@ def compare(solver, rows, picture, folder):
         made[case.title] = sounds(solver, case, rows[case.row])
         for name, sound in made[case.title].items():
             peak, exposure, middle, lasts = levels(sound)
-            lines.append(bench.row(case.title, name, f"{peak:.3g}", f"{exposure:.1f}", f"{middle:.0f}", f"{lasts:.2f}"))
+            lines.append(line(case.title, name, f"{peak:.3g}", f"{exposure:.1f}", f"{middle:.0f}", f"{lasts:.2f}"))
         for name, word in ((PAPER, "paper"), (OURS, "carillon")):
             loud = carillon.Sound(made[case.title][name][:, None], RATE_HZ).normalized(0.9)
             loud.save(pathlib.Path(folder) / f"{case.title}_{word}.wav")

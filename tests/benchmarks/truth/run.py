@@ -107,8 +107,8 @@ def drop_line(when, drop):
 
 def show_drops(options):
     print("## Five drops\n")
-    bench.print_head("body", "laws", "peak, Pa", "dB(A), fast", *(f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ),
-                     "40 dB down after, s", "loudest 0.4 s, LUFS")
+    octaves = [f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ]
+    bench.print_head("body", "laws", "peak, Pa", "dB(A), fast", *octaves, "40 dB down after, s", "loudest 0.4 s, LUFS")
     with programs.studio() as studio:
         pairs, energies = [], []
         for body in drops.BODIES:
