@@ -5,12 +5,15 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/trace_page.h"
+#include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
@@ -30,8 +33,7 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
     absl::FPrintF(
         out,
         "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
-        "transfer for the material: the sound changes once `carillon job list` shows none at work; "
-        "`carillon transfer` makes one that was never begun\n",
+        "transfer for the material: with --wait it is computed first\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
@@ -105,6 +107,36 @@ void PrintRenderingJson(const RenderOptions& options, const v1::RenderSummary& s
 
 }  // namespace
 
+absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces) {
+  std::map<std::string, v1::CreateTransferRequest> requests;
+  for (const std::string& path : traces) {
+    auto trace = client::ContactTraceReader::Open(path);
+    while (trace.ok()) {
+      const auto record = trace->Next();
+      if (!record.ok() || !*record) break;
+      const v1::ContactTraceObject& object = (*record)->object();
+      if (!(*record)->has_object() || object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING) {
+        continue;
+      }
+      v1::CreateTransferRequest request;
+      request.set_modal_model(object.modal_model());
+      *request.mutable_material() = object.material();
+      request.set_size(object.size());
+      requests.try_emplace(request.SerializeAsString(), request).first->second.set_label(
+          object.label());
+    }
+  }
+  std::vector<std::string> unfinished;
+  for (const auto& [key, request] : requests) {
+    const absl::StatusOr<v1::Job> job = daemon.CreateTransfer(request);
+    if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) unfinished.push_back(job->name());
+  }
+  for (const std::string& job : unfinished) {
+    RETURN_IF_ERROR(WatchWithProgress(daemon, job).status());
+  }
+  return absl::OkStatus();
+}
+
 v1::RenderSettings SettingsOf(const RenderOptions& options) {
   v1::RenderSettings settings;
   settings.set_sample_rate_hz(options.sample_rate_hz);
@@ -157,6 +189,7 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
 
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members) {
+  if (options.wait) RETURN_IF_ERROR(AwaitTransfers(daemon, {options.trace}));
   RenderedFile file(FormOf(options, options.out));
   v1::ContactTraceHeader header;
   RenderedTrace page{.trace = options.trace, .wave = options.out};
