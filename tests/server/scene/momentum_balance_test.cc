@@ -118,6 +118,12 @@ std::map<EngineMistake, double> Named(const EngineMistakes& mistakes) {
   return named;
 }
 
+/// The same of these steps.
+std::map<EngineMistake, double> Named(const std::vector<Told>& steps, double rate_hz) {
+  return Named(Mistakes(steps, rate_hz));
+}
+
+using enum EngineMistake;
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Key;
@@ -129,13 +135,13 @@ TEST(MomentumBalance, ARightSimulationHasNoMistake) {
     for (const int substeps : {1, 4}) {
       for (const double restitution : {0.0, 0.6}) {
         std::vector<Told> steps = Falls(rate_hz, substeps, restitution).Steps(8);
-        EXPECT_THAT(Named(Mistakes(steps, rate_hz)), IsEmpty()) << rate_hz;
+        EXPECT_THAT(Named(steps, rate_hz), IsEmpty()) << rate_hz;
         // The same with the poses before the step.
         for (size_t k = steps.size() - 1; k > 0; --k) {
           steps[k].position = steps[k - 1].position;
           steps[k].orientation = steps[k - 1].orientation;
         }
-        EXPECT_THAT(Named(Mistakes(steps, rate_hz)), IsEmpty()) << rate_hz;
+        EXPECT_THAT(Named(steps, rate_hz), IsEmpty()) << rate_hz;
       }
     }
   }
@@ -149,37 +155,34 @@ TEST(MomentumBalance, NamesARatioAndItsSize) {
       for (Told& told : steps) {
         for (Vector3& impulse : told.impulses) impulse = {by * impulse[0], 0, by * impulse[2]};
       }
-      return Named(Mistakes(steps, rate_hz));
+      return Named(steps, rate_hz);
     };
     const auto only = [](EngineMistake mistake, double ratio) {
       return ElementsAre(testing::Pair(mistake, testing::DoubleNear(ratio, 0.1 * std::abs(ratio))));
     };
-    EXPECT_THAT(scaled(rate_hz), only(EngineMistake::kForces, rate_hz));
-    EXPECT_THAT(scaled(2), only(EngineMistake::kTwice, 2));
-    EXPECT_THAT(scaled(6.3), only(EngineMistake::kOtherMass, 6.3));
-    EXPECT_THAT(scaled(-1), ElementsAre(Key(EngineMistake::kReversed))) << rate_hz;
-    EXPECT_THAT(Named(Mistakes(right, rate_hz, kMassKg / 1.6)),
-                only(EngineMistake::kOtherMass, 1.6));
+    EXPECT_THAT(scaled(rate_hz), only(kForces, rate_hz));
+    EXPECT_THAT(scaled(2), only(kTwice, 2));
+    EXPECT_THAT(scaled(6.3), only(kOtherMass, 6.3));
+    EXPECT_THAT(scaled(-1), ElementsAre(Key(kReversed))) << rate_hz;
+    EXPECT_THAT(Named(Mistakes(right, rate_hz, kMassKg / 1.6)), only(kOtherMass, 1.6));
   }
 }
 
 TEST(MomentumBalance, NamesTheFrameTheDelayAndTheFirstStep) {
   for (const double rate_hz : kRates) {
     const std::vector<Told> right = Falls(rate_hz).Steps(40);
-    EXPECT_THAT(Named(Mistakes(right, rate_hz, kMassKg, true)),
-                ElementsAre(Key(EngineMistake::kOtherFrame)))
+    EXPECT_THAT(Named(Mistakes(right, rate_hz, kMassKg, true)), ElementsAre(Key(kOtherFrame)))
         << rate_hz;
     std::vector<Told> late = right, first = right;
     for (size_t k = right.size() - 1; k > 0; --k) late[k].impulses = right[k - 1].impulses;
     late[0].impulses.clear();
-    EXPECT_THAT(Named(Mistakes(late, rate_hz)), ElementsAre(Key(EngineMistake::kLate))) << rate_hz;
+    EXPECT_THAT(Named(late, rate_hz), ElementsAre(Key(kLate))) << rate_hz;
     for (size_t k = 1; k < right.size(); ++k) {
       if (!right[k - 1].impulses.empty() || right[k].impulses.empty()) continue;
       first[k].impulses.clear();
       first[k].empty = true;
     }
-    EXPECT_THAT(Named(Mistakes(first, rate_hz)), ElementsAre(Key(EngineMistake::kFirstZero)))
-        << rate_hz;
+    EXPECT_THAT(Named(first, rate_hz), ElementsAre(Key(kFirstZero))) << rate_hz;
   }
 }
 
@@ -193,9 +196,9 @@ TEST(MomentumBalance, NamesTheLastSubstep) {
         steps[k].impulses.clear();
         if (falls.lasts[k] != Vector3{}) steps[k].impulses.push_back(falls.lasts[k]);
       }
-      const auto named = Named(Mistakes(steps, rate_hz));
-      ASSERT_TRUE(named.contains(EngineMistake::kLastSubstep)) << rate_hz << " " << substeps;
-      EXPECT_NEAR(named.at(EngineMistake::kLastSubstep), 1.0 / substeps, 0.05 / substeps);
+      const auto named = Named(steps, rate_hz);
+      ASSERT_TRUE(named.contains(kLastSubstep)) << rate_hz << " " << substeps;
+      EXPECT_NEAR(named.at(kLastSubstep), 1.0 / substeps, 0.05 / substeps);
     }
   }
 }
@@ -212,7 +215,7 @@ TEST(MomentumBalance, NamesAnImpulseThatStaysWhenTheBodyIsGone) {
     }
     for (const auto& steps : {thrown, falls}) {
       const EngineMistakes mistakes = Mistakes(steps, rate_hz);
-      EXPECT_THAT(Named(mistakes), ElementsAre(Key(EngineMistake::kStale))) << rate_hz;
+      EXPECT_THAT(Named(mistakes), ElementsAre(Key(kStale))) << rate_hz;
       EXPECT_NEAR(static_cast<double>(mistakes[2].count), 0.5 * rate_hz, 3);
     }
   }
@@ -230,8 +233,8 @@ TEST(MomentumBalance, ALiftOrAHandThatCarriesABodyIsNoMistake) {
     lift.push_back({.position = {0, 0, height}, .impulses = {{0, 0, weight + kMassKg * gains}}});
     hand.push_back({.position = {k % 40 == 0 ? 0.1 : 0, 0, 0}});
   }
-  EXPECT_THAT(Named(Mistakes(lift, kRateHz)), IsEmpty());
-  EXPECT_THAT(Named(Mistakes(hand, kRateHz)), IsEmpty());
+  EXPECT_THAT(Named(lift, kRateHz), IsEmpty());
+  EXPECT_THAT(Named(hand, kRateHz), IsEmpty());
 }
 
 TEST(MomentumBalance, WithoutPosesItNamesForcesAndEqualContacts) {
@@ -251,8 +254,8 @@ TEST(MomentumBalance, WithoutPosesItNamesForcesAndEqualContacts) {
     const double weight = kMassKg * kGravityMPerS2;
     EXPECT_THAT(rests(weight / rate_hz, 1), IsEmpty());
     EXPECT_THAT(rests(3 * weight / rate_hz, 1), IsEmpty());
-    EXPECT_THAT(rests(weight, 1), ElementsAre(Key(EngineMistake::kForces)));
-    EXPECT_THAT(rests(weight / rate_hz, 2), ElementsAre(Key(EngineMistake::kTwice)));
+    EXPECT_THAT(rests(weight, 1), ElementsAre(Key(kForces)));
+    EXPECT_THAT(rests(weight / rate_hz, 2), ElementsAre(Key(kTwice)));
   }
 }
 
@@ -274,7 +277,7 @@ TEST(MomentumBalance, NamesContactsOfTwoObjectsFromBothSidesBesideRightOnesWithA
       }
       balance.EndStep(k / 240.0);
     }
-    return balance.mistakes()[static_cast<size_t>(EngineMistake::kTwice)];
+    return balance.mistakes()[static_cast<size_t>(kTwice)];
   };
   EXPECT_EQ(balanced(false).count, 0);
   EXPECT_EQ(balanced(true).count, 8);  // four, each twice

@@ -34,39 +34,27 @@ inline MovedBody MakeBall(double size = 1) {
   return moved;
 }
 
-/// Calls `step(t, dt)` in small steps of a frame, at their middles, and keeps `value()` of each
-/// frame.
-template <class Value, class Step>
-std::vector<double> Integrate(double rate_hz, size_t frame_count, const Value& value,
-                              const Step& step) {
-  constexpr int kSteps = 400;
-  std::vector<double> sound;
-  for (size_t n = 0; n < frame_count; ++n) {
-    sound.push_back(value());
-    for (int i = 0; i < kSteps; ++i) {
-      step((static_cast<double>(n) + (i + 0.5) / kSteps) / rate_hz, 1 / (rate_hz * kSteps));
-    }
-  }
-  return sound;
-}
-
-/// y'' = -2 b y' - 2 b^2 y + b f', which is what the ball sounds like after the force f(t) (the
-/// field equation of transfer.proto as a differential equation). With y' = v + b f.
+/// y'' = -2 b y' - 2 b^2 y + b f' in small steps, which is what the ball sounds like after the
+/// force f(t) (the field equation of transfer.proto as a differential equation). With y' = v + b f.
 template <class Force>
 std::vector<double> IntegrateBall(double rate_hz, size_t frame_count, double amplitude,
                                   const Force& force) {
-  const double b = kBallSoundSpeed / kBallRadiusM;
+  constexpr int kSteps = 400;
+  const double b = kBallSoundSpeed / kBallRadiusM, dt = 1 / (rate_hz * kSteps);
+  std::vector<double> sound;
   double y = 0, v = 0;
-  return Integrate(
-      rate_hz, frame_count, [&] { return amplitude * y; },
-      [&](double t, double dt) {
-        // The rule of the middle point.
-        const double f = force(t);
-        const double y_middle = y + dt / 2 * (v + b * f);
-        const double v_middle = v + dt / 2 * (-2 * b * (v + b * f) - 2 * b * b * y);
-        y += dt * (v_middle + b * f);
-        v += dt * (-2 * b * (v_middle + b * f) - 2 * b * b * y_middle);
-      });
+  for (size_t n = 0; n < frame_count; ++n) {
+    sound.push_back(amplitude * y);
+    for (int i = 0; i < kSteps; ++i) {
+      // The rule of the middle point.
+      const double f = force((static_cast<double>(n) + (i + 0.5) / kSteps) / rate_hz);
+      const double y_middle = y + dt / 2 * (v + b * f);
+      const double v_middle = v + dt / 2 * (-2 * b * (v + b * f) - 2 * b * b * y);
+      y += dt * (v_middle + b * f);
+      v += dt * (-2 * b * (v_middle + b * f) - 2 * b * b * y_middle);
+    }
+  }
+  return sound;
 }
 
 }  // namespace carillon

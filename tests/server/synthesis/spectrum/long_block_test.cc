@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <complex>
+#include <map>
 #include <numbers>
 #include <vector>
 
@@ -45,12 +46,14 @@ double LongBlockErrorDb(double frequency_hz, double t60_s, const LongBlock& bloc
 }
 
 TEST(Spectrum, ALongBlockIsTheClosedFormForEachModeThatIsPutThere) {
+  std::map<double, int> counts;  // of modes by T60
   for (const size_t block_frame_count : {64U, 100U, 128U, 256U}) {
     for (const double t60_s : {0.02, 0.05, 0.1, 1.0, 60.0}) {
       for (const double frequency_hz : {20.0, 23.4, 440.0, 5000.3, 19999.0, 23990.0}) {
         const Complex log_q(-DecayOf(t60_s) / kTestSampleRateHz, frequency_hz);
         const auto kind = ChooseLongBlock(log_q, block_frame_count);
         if (!kind) continue;
+        ++counts[t60_s];
         const LongBlock block = MakeLongBlocks(block_frame_count)[*kind];
         // What eight bins and single precision give; worst where a mode mirrors at 0 Hz.
         EXPECT_LT(LongBlockErrorDb(frequency_hz, t60_s, block), -106)
@@ -58,6 +61,7 @@ TEST(Spectrum, ALongBlockIsTheClosedFormForEachModeThatIsPutThere) {
       }
     }
   }
+  for (const double t60_s : {0.05, 0.1, 1.0, 60.0}) EXPECT_EQ(counts[t60_s], 24) << t60_s;
 }
 
 /// Modes of all kinds of long blocks, and of none.
