@@ -44,16 +44,22 @@ inline Family FamilyOf(const TetMesh& mesh, const Eigen::VectorXd& shape, double
   return about > across ? Family::kTorsional : Family::kBending;
 }
 
-/// Natural frequencies of one family, Hz, ascending.
-inline std::vector<double> FrequenciesOf(Family family, const TetMesh& mesh,
-                                         const DeformationModes& modes, double y, double z) {
-  std::vector<double> result;
-  const std::vector<double> all = FrequenciesHz(modes);
-  for (size_t m = 0; m < all.size(); ++m) {
-    const auto column = static_cast<Eigen::Index>(m);
-    if (FamilyOf(mesh, modes.modes.shapes.col(column), y, z) == family) result.push_back(all[m]);
+/// A bar whose axis goes through (y, z), and its modes.
+struct BarModes {
+  TetMesh mesh;
+  DeformationModes modes;
+  double y = 0, z = 0;
+
+  /// Natural frequencies of one family, Hz, ascending.
+  std::vector<double> Of(Family family) const {
+    std::vector<double> result;
+    const std::vector<double> all = FrequenciesHz(modes);
+    for (size_t m = 0; m < all.size(); ++m) {
+      const auto column = static_cast<Eigen::Index>(m);
+      if (FamilyOf(mesh, modes.modes.shapes.col(column), y, z) == family) result.push_back(all[m]);
+    }
+    return result;
   }
-  return result;
-}
+};
 
 }  // namespace carillon::precompute

@@ -11,6 +11,9 @@
 
 namespace carillon::precompute {
 
+inline constexpr ElasticConstants kSteel{.young_pa = 210e9, .poisson_ratio = 0.3};
+inline constexpr double kSteelDensity = 7850;
+
 /// A body's deformation modes below `limit_hz`, solved for with the material itself.
 inline DeformationModes ModesOf(const TetMesh& mesh, const ElasticConstants& elastic,
                                 double density_kg_per_m3, double limit_hz,
@@ -30,6 +33,22 @@ inline std::vector<double> FrequenciesHz(const DeformationModes& solution) {
     frequencies.push_back(std::sqrt(eigenvalue) / (2 * std::numbers::pi));
   }
   return frequencies;
+}
+
+/// Expects found[0], found[step], found[2 step]... to be `expected_hz` of 1, 2, 3... to `count`.
+template <typename ExpectedHz>
+void ExpectSeries(const std::vector<double>& found, size_t step, size_t count,
+                  ExpectedHz expected_hz, double tolerance) {
+  ASSERT_GE(found.size(), step * count);
+  for (size_t n = 1; n <= count; ++n) {
+    EXPECT_NEAR(found[step * (n - 1)] / expected_hz(static_cast<int>(n)), 1, tolerance) << n;
+  }
+}
+
+/// Expects the first frequencies to come in pairs that differ by at most `split` of themselves.
+inline void ExpectPairs(const std::vector<double>& found, size_t count, double split) {
+  ASSERT_GE(found.size(), 2 * count);
+  for (size_t m = 0; m < 2 * count; m += 2) EXPECT_NEAR(found[m + 1] / found[m], 1, split) << m;
 }
 
 }  // namespace carillon::precompute

@@ -17,38 +17,24 @@ constexpr std::array kCells{6, 3, 2};
 
 /// Lambda' = Lambda e / (r s^2), phi' = phi r^(-1/2) s^(-3/2), c' = c e^(1/2) r^(-1) s^(-1/2): a
 /// second decomposition of the scaled body must find what scaling the first gives.
-struct ScalingTest : ::testing::Test {
-  TetMesh unit_mesh = MakeTetBox({1, 0.6, 0.3}, kCells, 10);
-  TetMesh scaled_mesh = MakeTetBox({kS, 0.6 * kS, 0.3 * kS}, kCells, 10);
-  DeformationModes unit = ModesOf(unit_mesh, {.young_pa = 1, .poisson_ratio = 0.3}, 1, 1.2);
-  DeformationModes scaled = ModesOf(scaled_mesh, {.young_pa = kE, .poisson_ratio = 0.3}, kR,
-                                    1.2 * std::sqrt(kE / kR) / kS);
-};
-
-TEST_F(ScalingTest, EigenvaluesScale) {
-  ASSERT_GT(unit.modes.eigenvalues.size(), 5);
-  ASSERT_EQ(scaled.modes.eigenvalues.size(), unit.modes.eigenvalues.size());
-  for (Eigen::Index m = 0; m < unit.modes.eigenvalues.size(); ++m) {
-    EXPECT_NEAR(scaled.modes.eigenvalues[m] / (unit.modes.eigenvalues[m] * kE / (kR * kS * kS)), 1,
-                1e-8);
-  }
-}
-
-TEST_F(ScalingTest, ShapesScale) {
-  for (Eigen::Index m = 0; m < unit.modes.eigenvalues.size(); ++m) {
-    const double factor = std::pow(kR, -0.5) * std::pow(kS, -1.5);
-    EXPECT_NEAR((scaled.modes.shapes.col(m) - factor * unit.modes.shapes.col(m)).norm() /
-                    (factor * unit.modes.shapes.col(m).norm()),
+TEST(Scaling, OfEigenvaluesShapesAndCouplingsIsThatOfASecondDecomposition) {
+  const TetMesh unit_mesh = MakeTetBox({1, 0.6, 0.3}, kCells, 10);
+  const TetMesh scaled_mesh = MakeTetBox({kS, 0.6 * kS, 0.3 * kS}, kCells, 10);
+  const Modes unit = ModesOf(unit_mesh, {.young_pa = 1, .poisson_ratio = 0.3}, 1, 1.2).modes;
+  const Modes scaled = ModesOf(scaled_mesh, {.young_pa = kE, .poisson_ratio = 0.3}, kR,
+                               1.2 * std::sqrt(kE / kR) / kS)
+                           .modes;
+  ASSERT_GT(unit.eigenvalues.size(), 5);
+  ASSERT_EQ(scaled.eigenvalues.size(), unit.eigenvalues.size());
+  const Eigen::VectorXd before = Couplings(unit_mesh, MakeSoundingSurface(unit_mesh), unit);
+  const Eigen::VectorXd after = Couplings(scaled_mesh, MakeSoundingSurface(scaled_mesh), scaled);
+  const double factor = std::pow(kR, -0.5) * std::pow(kS, -1.5);
+  for (Eigen::Index m = 0; m < unit.eigenvalues.size(); ++m) {
+    EXPECT_NEAR(scaled.eigenvalues[m] / (unit.eigenvalues[m] * kE / (kR * kS * kS)), 1, 1e-8);
+    EXPECT_NEAR((scaled.shapes.col(m) - factor * unit.shapes.col(m)).norm() /
+                    (factor * unit.shapes.col(m).norm()),
                 0, 1e-4)
         << m;
-  }
-}
-
-TEST_F(ScalingTest, CouplingsScale) {
-  const Eigen::VectorXd before = Couplings(unit_mesh, MakeSoundingSurface(unit_mesh), unit.modes);
-  const Eigen::VectorXd after =
-      Couplings(scaled_mesh, MakeSoundingSurface(scaled_mesh), scaled.modes);
-  for (Eigen::Index m = 0; m < before.size(); ++m) {
     EXPECT_NEAR(after[m] / (before[m] * std::sqrt(kE) / kR / std::sqrt(kS)), 1, 1e-4) << m;
   }
 }

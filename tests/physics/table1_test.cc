@@ -3,7 +3,6 @@
 // What Table 1 of O'Brien, Shen, Gatchalian 2002 says of damping and of rows that share a shape.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <numbers>
 
 #include "precompute/fem/elastic_constants.h"

@@ -39,7 +39,7 @@ double FirstBendingHz(const FreeBeam& beam, const BeamMaterial& material) {
   return low / (2 * std::numbers::pi);
 }
 
-double ClampedBendingHz(const FreeBeam& beam, const BeamMaterial& material, int order) {
+double ClampedBendingHz(const FreeBeam& beam, int order, const BeamMaterial& material) {
   const double bending = material.young_pa * beam.second_moment_m4;
   const double shear = beam.shear_coefficient * beam.area_m2 * material.young_pa /
                        (2 * (1 + material.poisson_ratio));
@@ -75,18 +75,6 @@ FreeBeam RectangularBeam(double length_m, double height_m, double width_m, doubl
           .area_m2 = height_m * width_m,
           .second_moment_m4 = width_m * std::pow(height_m, 3) / 12,
           .shear_coefficient = 10 * (1 + poisson_ratio) / (12 + 11 * poisson_ratio)};
-}
-
-FreeBeam TubularBeam(double length_m, double outer_radius_m, double wall_m, double poisson_ratio) {
-  const double inner = outer_radius_m - wall_m;
-  const double m2 = std::pow(inner / outer_radius_m, 2);
-  const double c = (1 + m2) * (1 + m2);
-  return {
-      .length_m = length_m,
-      .area_m2 = std::numbers::pi * (std::pow(outer_radius_m, 2) - std::pow(inner, 2)),
-      .second_moment_m4 = std::numbers::pi / 4 * (std::pow(outer_radius_m, 4) - std::pow(inner, 4)),
-      .shear_coefficient = 6 * (1 + poisson_ratio) * c /
-                           ((7 + 6 * poisson_ratio) * c + (20 + 12 * poisson_ratio) * m2)};
 }
 
 }  // namespace carillon
