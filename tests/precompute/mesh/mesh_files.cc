@@ -61,12 +61,13 @@ class Figures {
       absl::StrAppend(&bytes, " ", value);
     }
   }
-  template <typename T>
-  void PutAll(const std::vector<T>& values) {
-    for (const T value : values) Put(value);
-  }
   void EndLine() {
     if (!is_binary_) bytes += '\n';
+  }
+  template <typename... T>
+  void PutLine(T... values) {
+    (Put(values), ...);
+    EndLine();
   }
 
   std::string bytes;
@@ -76,57 +77,35 @@ class Figures {
 };
 
 void PutEntities(Figures& out) {
-  out.PutAll<uint64_t>({1, 0, 1, 1});
-  out.EndLine();
-  out.Put(int32_t{3});
-  out.PutAll<double>({0, 0, 0});
-  out.Put(uint64_t{0});
-  out.EndLine();
-  out.Put(int32_t{6});
-  out.PutAll<double>({0, 0, 0, 1, 1, 1});
-  out.Put(uint64_t{2});
-  out.PutAll<int32_t>({8, -5});
-  out.Put(uint64_t{1});
-  out.Put(int32_t{3});
-  out.EndLine();
-  out.Put(int32_t{1});
-  out.PutAll<double>({0, 0, 0, 1, 1, 1});
-  out.Put(uint64_t{1});
-  out.Put(int32_t{7});
-  out.Put(uint64_t{1});
-  out.Put(int32_t{6});
-  out.EndLine();
+  const uint64_t none = 0, one = 1, two = 2;
+  out.PutLine(one, none, one, one);
+  out.PutLine(3, 0.0, 0.0, 0.0, none);
+  out.PutLine(6, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, two, 8, -5, one, 3);
+  out.PutLine(1, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, one, 7, one, 6);
 }
 
 void PutNodes(const TetMesh& mesh, Figures& out) {
   const size_t on_surface = mesh.nodes.size() / 2;
-  out.PutAll<uint64_t>(
-      {2, mesh.nodes.size(), kFirstNodeNumber, kFirstNodeNumber + mesh.nodes.size() - 1});
-  out.EndLine();
+  out.PutLine(uint64_t{2}, mesh.nodes.size(), uint64_t{kFirstNodeNumber},
+              kFirstNodeNumber + mesh.nodes.size() - 1);
   for (const bool surface : {true, false}) {
     const size_t first = surface ? 0 : on_surface;
     const size_t last = surface ? on_surface : mesh.nodes.size();
-    out.PutAll<int32_t>({surface ? 2 : 3, surface ? 6 : 1, surface ? 1 : 0});
-    out.Put(uint64_t{last - first});
-    out.EndLine();
+    out.PutLine(surface ? 2 : 3, surface ? 6 : 1, surface ? 1 : 0, last - first);
     for (size_t n = first; n < last; ++n) out.Put(uint64_t{n + kFirstNodeNumber});
     out.EndLine();
     for (size_t n = first; n < last; ++n) {
       for (const double x : mesh.nodes[n]) out.Put(x);
-      if (surface) out.PutAll<double>({0.5, 0.25});
-      out.EndLine();
+      surface ? out.PutLine(0.5, 0.25) : out.EndLine();
     }
   }
 }
 
 void PutElements(const TetMesh& mesh, Figures& out) {
   uint64_t number = 1;
-  out.PutAll<uint64_t>({2, mesh.boundary.size() + mesh.element_count(), 1,
-                        mesh.boundary.size() + mesh.element_count()});
-  out.EndLine();
-  out.PutAll<int32_t>({2, 6, 2});
-  out.Put(uint64_t{mesh.boundary.size()});
-  out.EndLine();
+  const size_t count = mesh.boundary.size() + mesh.element_count();
+  out.PutLine(uint64_t{2}, count, number, count);
+  out.PutLine(2, 6, 2, mesh.boundary.size());
   for (const BoundaryFace& face : mesh.boundary) {
     out.Put(number++);
     for (size_t i = 0; i < 3; ++i) {
@@ -134,9 +113,7 @@ void PutElements(const TetMesh& mesh, Figures& out) {
     }
     out.EndLine();
   }
-  out.PutAll<int32_t>({3, 1, mesh.nodes_per_element == 10 ? 11 : 4});
-  out.Put(uint64_t{mesh.element_count()});
-  out.EndLine();
+  out.PutLine(3, 1, mesh.nodes_per_element == 10 ? 11 : 4, mesh.element_count());
   for (size_t e = 0; e < mesh.element_count(); ++e) {
     out.Put(number++);
     for (const int32_t node : GmshNodes(mesh, e)) out.Put(static_cast<uint64_t>(node));

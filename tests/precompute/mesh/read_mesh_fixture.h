@@ -1,49 +1,56 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "precompute/mesh/read/read_mesh.h"
+#include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
 
 /// Writes a mesh file and reads it.
 class ReadMeshTest : public testing::Test {
  protected:
-  absl::StatusOr<Mesh> Read(const std::string& bytes, const std::string& format,
-                            double metres_per_unit = 1) const {
-    absl::StatusOr<NamedMesh> named = ReadNamed(bytes, format, metres_per_unit);
-    if (!named.ok()) return named.status();
-    return std::move(named->mesh);
-  }
-
-  absl::StatusOr<NamedMesh> ReadNamed(const std::string& bytes, const std::string& format,
-                                      double metres_per_unit = 1) const {
+  absl::StatusOr<NamedMesh> Read(const std::string& bytes, const std::string& format,
+                                 double metres_per_unit = 1) const {
     std::ofstream(path_, std::ios::binary) << bytes;
     absl::StatusOr<NamedMesh> named = ReadMesh(path_, format, metres_per_unit);
     std::filesystem::remove(path_);
     return named;
   }
 
+  /// A refusal ends the test.
+  NamedMesh ReadNamed(const std::string& bytes, const std::string& format,
+                      double metres_per_unit = 1) const {
+    return Read(bytes, format, metres_per_unit).value();
+  }
+
   SurfaceMesh ReadSurfaceOf(const std::string& bytes, const std::string& format) const {
-    const absl::StatusOr<Mesh> mesh = Read(bytes, format);
-    EXPECT_TRUE(mesh.ok()) << mesh.status();
-    return mesh.ok() ? std::get<SurfaceMesh>(*mesh) : SurfaceMesh{};
+    return std::get<SurfaceMesh>(ReadNamed(bytes, format).mesh);
   }
 
   TetMesh ReadTetsOf(const std::string& bytes, const std::string& format = "msh") const {
-    const absl::StatusOr<Mesh> mesh = Read(bytes, format);
-    EXPECT_TRUE(mesh.ok()) << mesh.status();
-    return mesh.ok() ? std::get<TetMesh>(*mesh) : TetMesh{};
+    return std::get<TetMesh>(ReadNamed(bytes, format).mesh);
   }
 
   std::string Refused(const std::string& bytes, const std::string& format) const {
     return Read(bytes, format).status().ToString();
+  }
+
+  /// Expects that each file is refused with these words.
+  void ExpectRefused(const std::string& format,
+                     const std::vector<std::pair<std::string, const char*>>& cases) const {
+    for (const auto& [file, words] : cases) {
+      EXPECT_THAT(Refused(file, format), testing::HasSubstr(words)) << format << ": " << file;
+    }
   }
 
  private:
@@ -51,6 +58,17 @@ class ReadMeshTest : public testing::Test {
   std::string path_ = testing::TempDir() + "mesh_of_" +
                       testing::UnitTest::GetInstance()->current_test_info()->name();
 };
+
+/// Has 24 nodes of four-node tetrahedra.
+inline TetMesh SmallTetBox(int nodes_per_element) {
+  return MakeTetBox({1, 0.5, 0.25}, {3, 2, 1}, nodes_per_element);
+}
+
+inline std::vector<std::string> GroupNames(const NamedMesh& named) {
+  std::vector<std::string> names;
+  for (const MeshGroup& group : named.names.groups) names.push_back(group.name);
+  return names;
+}
 
 inline void ExpectSame(const TetMesh& read, const TetMesh& written) {
   EXPECT_EQ(read.nodes, written.nodes);

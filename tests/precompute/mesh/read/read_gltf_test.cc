@@ -24,8 +24,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
-using ReadGltfTest = ReadMeshTest;
-
 constexpr int kUint8 = 5121, kUint16 = 5123, kFloat = 5126;
 
 /// A document whose accessors are added one after the other.
@@ -36,15 +34,15 @@ class Document {
              {"scenes", {{{"nodes", {0}}}}},  {"nodes", {{{"mesh", 0}}}},
              {"accessors", Json::array()},    {"bufferViews", Json::array()}};
     points_ = Add<float>("VEC3", kFloat, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
-    corners_ = Add<uint8_t>("SCALAR", kUint8, {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3});
+    const size_t corners = Add<uint8_t>("SCALAR", kUint8, {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3});
     root_["meshes"] = {
-        {{"primitives", {{{"attributes", {{"POSITION", points_}}}, {"indices", corners_}}}}}};
+        {{"primitives", {{{"attributes", {{"POSITION", points_}}}, {"indices", corners}}}}}};
   }
 
   Json& root() { return root_; }
   Json& primitive() { return root_["meshes"][0]["primitives"][0]; }
   size_t points() const { return points_; }
-  size_t corners() const { return corners_; }
+  const std::string& data() const { return data_; }
 
   template <typename T>
   size_t AddView(const std::vector<T>& values) {
@@ -66,29 +64,54 @@ class Document {
   }
 
   std::string Text() const {
+    return Text("data:application/octet-stream;base64," + absl::Base64Escape(data_));
+  }
+  /// With the bytes at another place.
+  std::string Text(const std::string& uri) const {
     Json all = root_;
-    all["buffers"] = {
-        {{"byteLength", data_.size()},
-         {"uri", "data:application/octet-stream;base64," + absl::Base64Escape(data_)}}};
+    all["buffers"] = {{{"byteLength", data_.size()}, {"uri", uri}}};
     return all.dump();
   }
 
  private:
   Json root_;
   std::string data_;
-  size_t points_ = 0, corners_ = 0;
+  size_t points_ = 0;
 };
 
-double VolumeOf(const SurfaceMesh& surface) {
-  const std::vector<Shell> shells = FindShells(surface);
-  return shells.size() == 1 ? shells[0].volume_m3 : 0;
+class ReadGltfTest : public ReadMeshTest {
+ protected:
+  void ExpectVolume(const Document& document, double volume, double tolerance = 1e-7) const {
+    const std::vector<Shell> shells = FindShells(ReadSurfaceOf(document.Text(), "gltf"));
+    ASSERT_EQ(shells.size(), 1U);
+    EXPECT_NEAR(shells[0].volume_m3, volume, tolerance);
+  }
+};
+
+TEST_F(ReadGltfTest, PartsAreThereAsOftenAsTheSceneHasThem) {
+  Document document;
+  document.root()["nodes"].push_back({{"mesh", 0}, {"translation", {5, 0, 0}}});
+  const SurfaceMesh once = ReadSurfaceOf(document.Text(), "gltf");
+  EXPECT_EQ(once.triangles.size(), 4U);
+  EXPECT_EQ(once.vertices.size(), 4U);
+  document.root()["scenes"][0]["nodes"] = {0, 1};
+  EXPECT_EQ(ReadSurfaceOf(document.Text(), "gltf").triangles.size(), 8U);
+}
+
+TEST_F(ReadGltfTest, NoFileBesideItIsRead) {
+  Document document;
+  const std::string outside = testing::TempDir() + "outside_of_gltf.bin";
+  std::ofstream(outside, std::ios::binary) << document.data();
+  EXPECT_THAT(Refused(document.Text(outside), "gltf"),
+              AllOf(HasSubstr("MESH_UNREADABLE"), HasSubstr("which did not come with it")));
+  std::filesystem::remove(outside);
 }
 
 TEST_F(ReadGltfTest, AMirroredNodeKeepsItsSurfaceOutside) {
   for (const double x : {-1.0, 1.0}) {
     Document document;
     document.root()["nodes"][0]["scale"] = {x, 1, 1};
-    EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 1.0 / 6, 1e-7) << x;
+    ExpectVolume(document, 1.0 / 6);
   }
 }
 
@@ -102,7 +125,7 @@ TEST_F(ReadGltfTest, AChildIsPlacedByItsParents) {
   EXPECT_TRUE(std::ranges::any_of(body.vertices, [](const Point& p) {
     return Distance(p, {0, 3, 0}) < 1e-6;
   }));
-  EXPECT_NEAR(VolumeOf(body), 0.5, 1e-6);
+  ExpectVolume(document, 0.5, 1e-6);
 }
 
 TEST_F(ReadGltfTest, QuantizedPositionsAreReadAsTheNodeScalesThem) {
@@ -120,7 +143,7 @@ TEST_F(ReadGltfTest, QuantizedPositionsAreReadAsTheNodeScalesThem) {
     const double scale = normalized ? 1 : 1.0 / 65535;
     document.root()["nodes"][0]["scale"] = {scale, scale, scale};
     document.root()["extensionsRequired"] = {"KHR_mesh_quantization"};
-    EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 1.0 / 6, 1e-7);
+    ExpectVolume(document, 1.0 / 6);
   }
 }
 
@@ -134,7 +157,7 @@ TEST_F(ReadGltfTest, ASparseAccessorChangesOrMakesPositions) {
     points["sparse"] = {{"count", 3},
                         {"indices", {{"bufferView", indices}, {"componentType", kUint8}}},
                         {"values", {{"bufferView", values}}}};
-    EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 2.0 / 6, 1e-7);
+    ExpectVolume(document, 2.0 / 6);
   }
 }
 
@@ -143,7 +166,7 @@ TEST_F(ReadGltfTest, MorphTargetsAreAddedByTheirWeights) {
   const size_t moves = document.Add<float>("VEC3", kFloat, {0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0});
   document.primitive()["targets"] = {{{"POSITION", moves}}};
   document.root()["meshes"][0]["weights"] = {0.5};
-  EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 2.0 / 6, 1e-7);
+  ExpectVolume(document, 2.0 / 6);
 }
 
 /// A rig at a hundredth, as exporters write bodies in centimetres.
@@ -164,8 +187,8 @@ TEST_F(ReadGltfTest, ASkinIsBentAsItsJointsStand) {
     document.primitive()["attributes"]["WEIGHTS_0"] =
         document.Add<float>("VEC4", kFloat, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
     const double side = has_inverse ? 2 : 0.01;
-    EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")) / (side * side * side), 1.0 / 6,
-                1e-6);
+    const double cube = side * side * side;
+    ExpectVolume(document, cube / 6, 1e-6 * cube);
   }
 }
 
@@ -180,7 +203,7 @@ TEST_F(ReadGltfTest, WeightsOfASkinAreSharesOfTheirSum) {
       "VEC4", kUint8, {127, 123, 0, 0, 200, 50, 0, 0, 9, 1, 0, 0, 255, 1, 0, 0});
   document.root()["accessors"][weights]["normalized"] = true;
   document.primitive()["attributes"]["WEIGHTS_0"] = weights;
-  EXPECT_NEAR(VolumeOf(ReadSurfaceOf(document.Text(), "gltf")), 1.0 / 6, 1e-6);
+  ExpectVolume(document, 1.0 / 6, 1e-6);
   document.primitive()["attributes"]["WEIGHTS_0"] =
       document.Add<float>("VEC4", kFloat, {1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0});
   EXPECT_THAT(Refused(document.Text(), "gltf"),
@@ -191,14 +214,14 @@ TEST_F(ReadGltfTest, StripsAndFansAreTriangles) {
   Document strip;
   strip.primitive()["mode"] = 5;
   strip.primitive()["indices"] = strip.Add<uint8_t>("SCALAR", kUint8, {0, 2, 1, 3, 0, 2});
-  EXPECT_NEAR(VolumeOf(ReadSurfaceOf(strip.Text(), "gltf")), 1.0 / 6, 1e-7);
+  ExpectVolume(strip, 1.0 / 6);
   Document fan;
   fan.primitive()["mode"] = 6;
   fan.primitive()["indices"] = fan.Add<uint8_t>("SCALAR", kUint8, {3, 0, 1, 2, 0});
   Json base = fan.primitive();
   base["indices"] = fan.Add<uint8_t>("SCALAR", kUint8, {0, 2, 1});
   fan.root()["meshes"][0]["primitives"].push_back(base);
-  EXPECT_NEAR(VolumeOf(ReadSurfaceOf(fan.Text(), "gltf")), 1.0 / 6, 1e-7);
+  ExpectVolume(fan, 1.0 / 6);
 }
 
 TEST_F(ReadGltfTest, WhatIsNotReadIsRefusedByNameWithTheWayOut) {

@@ -23,14 +23,10 @@ using ::testing::StartsWith;
 class Boxes {
  public:
   Boxes& Add(const Point& low, const Point& size, int32_t region) {
-    const SurfaceMesh box = MakeBoxSurface(size);
-    for (const auto& triangle : box.triangles) {
-      std::array<Point, 3> corners;
-      for (size_t i = 0; i < 3; ++i) {
-        corners[i] = box.vertices[static_cast<size_t>(triangle[i])];
-        for (size_t x = 0; x < 3; ++x) corners[i][x] += low[x];
-      }
-      triangles.push_back(corners);
+    SurfaceMesh box;
+    AddShell(box, MakeBoxSurface(size), low);
+    for (size_t t = 0; t < box.triangles.size(); ++t) {
+      triangles.push_back(CornersOf(box, t));
       regions.push_back(region);
     }
     return *this;
@@ -44,36 +40,26 @@ class Boxes {
   std::vector<int32_t> regions;
 };
 
-/// The volumes of the regions of the filled body, and the largest of each that its neighbour holds.
-std::vector<double> FilledVolumes(const JoinedParts& joined, int nodes_per_element = 10) {
-  absl::StatusOr<TetMesh> mesh = Tetrahedralize(
-      joined.outside, {.target_node_count = 400, .nodes_per_element = nodes_per_element},
-      joined.walls);
-  EXPECT_TRUE(mesh.ok()) << mesh.status();
-  if (!mesh.ok()) return {};
-  NameRegions(joined.parts, *mesh);
-  std::vector<double> volumes(2);
-  for (size_t e = 0; e < mesh->element_count(); ++e) {
-    const int32_t* n = &mesh->elements[e * static_cast<size_t>(mesh->nodes_per_element)];
-    const auto at = [&](size_t i) { return mesh->nodes[static_cast<size_t>(n[i])]; };
-    volumes[mesh->RegionOf(e)] += TetVolume(at(0), at(1), at(2), at(3));
-  }
-  return volumes;
-}
-
+/// Expects these volumes of the regions of the filled body.
 void ExpectVolumes(const absl::StatusOr<JoinedParts>& joined, double first, double second) {
   ASSERT_TRUE(joined.ok()) << joined.status();
-  const std::vector<double> volumes = FilledVolumes(*joined);
-  ASSERT_EQ(volumes.size(), 2U);
+  TetMesh mesh = Tetrahedralize(joined->outside, {.target_node_count = 400}, joined->walls).value();
+  NameRegions(joined->parts, mesh);
+  std::vector<double> volumes(2);
+  for (size_t e = 0; e < mesh.element_count(); ++e) {
+    const int32_t* n = &mesh.elements[e * static_cast<size_t>(mesh.nodes_per_element)];
+    const auto at = [&](size_t i) { return mesh.nodes[static_cast<size_t>(n[i])]; };
+    volumes[mesh.RegionOf(e)] += TetVolume(at(0), at(1), at(2), at(3));
+  }
   EXPECT_NEAR(volumes[0] / first, 1, 1e-6);
   EXPECT_NEAR(volumes[1] / second, 1, 1e-6);
 }
 
 TEST(JoinParts, BoxesWithTheSameWallAreTwoRegions) {
-  const auto joined = Boxes().Add({0, 0, 1}, {1, 1, 1}, 0).Add({0, 0, 0}, {1, 1, 1}, 1).Join();
-  ASSERT_TRUE(joined.ok()) << joined.status();
-  EXPECT_EQ(joined->outside.triangles.size(), 20U);
-  EXPECT_EQ(joined->walls.size(), 2U);
+  const auto joined =
+      Boxes().Add({0, 0, 1}, {1, 1, 1}, 0).Add({0, 0, 0}, {1, 1, 1}, 1).Join().value();
+  EXPECT_EQ(joined.outside.triangles.size(), 20U);
+  EXPECT_EQ(joined.walls.size(), 2U);
   ExpectVolumes(joined, 1, 1);
 }
 
@@ -91,9 +77,9 @@ TEST(JoinParts, ARegionMayHaveTwoPieces) {
                           .Add({0, 0, 0}, {1, 1, 0.5}, 0)
                           .Add({0, 0, 0.5}, {1, 1, 2}, 1)
                           .Add({0, 0, 2.5}, {1, 1, 0.5}, 0)
-                          .Join();
-  ASSERT_TRUE(joined.ok()) << joined.status();
-  EXPECT_EQ(joined->parts.size(), 3U);
+                          .Join()
+                          .value();
+  EXPECT_EQ(joined.parts.size(), 3U);
   ExpectVolumes(joined, 1, 2);
 }
 
