@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "precompute/mesh/boundary.h"
-#include "precompute/modes/deformation_modes.h"
+#include "tests/precompute/modes/unit_body.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -22,11 +22,8 @@ using ::testing::Pointwise;
 /// A bar of unit material and `size` times its size, with all its modes up to the same one.
 ModalModel Bar(double size) {
   const TetMesh mesh = MakeTetBox({size, 0.3 * size, 0.2 * size}, {8, 3, 2}, 4);
-  const ElasticConstants elastic{.young_pa = 1, .poisson_ratio = 0.3};
-  const auto solution =
-      SolveDeformationModes(Assemble(mesh, elastic, 1, MassSharing::kConsistent), mesh.nodes,
-                            250 / (size * size), [](SolveStage, double) {});
-  return MakeModalModel(mesh, BoundarySurface(mesh), elastic, *solution);
+  return MakeModalModel(mesh, BoundarySurface(mesh), kUnitElastic,
+                        ModesBelow(250 / (size * size), mesh));
 }
 
 /// Loudness at the beginning: each vertex struck along its normal with a unit impulse, averaged

@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "precompute/mesh/point_math.h"
-#include "precompute/modes/deformation_modes.h"
-#include "precompute/modes/error_estimate.h"
+#include "tests/precompute/modes/unit_body.h"
 #include "tests/precompute/test_meshes.h"
 
 namespace carillon::precompute {
@@ -99,50 +98,20 @@ TEST(PlaceWeights, RiseWithTheWidthOfElementsInAFlatWall) {
   EXPECT_GT(eight, 1.6 * four);
 }
 
-/// The first modes of a square plate whose elements are four times as wide as high.
+// A plate whose elements are four times as wide as high.
 TEST(ErrorEstimate, CoversTheErrorsOfAThinPlate) {
-  constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
   constexpr double kLimit = 0.5;
-  const auto solve = [&](const TetMesh& mesh, double limit) {
-    auto solution = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent),
-                                          mesh.nodes, limit, [](SolveStage, double) {});
-    EXPECT_TRUE(solution.ok()) << solution.status();
-    return *std::move(solution);
-  };
   constexpr Point kPlate = {1, 0.75, 0.03125};
   const TetMesh mesh = MakeTetBox(kPlate, {8, 6, 1}, 10);
-  const DeformationModes fine = solve(MakeTetBox(kPlate, {24, 18, 1}, 10), kLimit);
-  const DeformationModes coarse = solve(mesh, 1.3 * kLimit);
-  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes).errors;
-  ASSERT_GE(fine.modes.eigenvalues.size(), 6);
-  ASSERT_GE(errors.size(), 6);
-  for (Eigen::Index m = 0; m < 6; ++m) {
-    const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
-    EXPECT_GT(errors[m], right) << "mode " << m;
-    EXPECT_LT(errors[m], 2.5 * right) << "mode " << m << ", in truth " << right;
-  }
+  const DeformationModes fine = ModesBelow(kLimit, MakeTetBox(kPlate, {24, 18, 1}, 10));
+  const DeformationModes coarse = ModesBelow(1.3 * kLimit, mesh);
+  ExpectErrorsNearTruth(mesh, coarse, fine, 6, {.least = 1, .most = 2.5});
 }
 
 TEST(ErrorEstimate, CoversTheErrorsOfABodyWithAReentrantEdge) {
-  constexpr ElasticConstants kElastic{.young_pa = 1, .poisson_ratio = 0.3};
-  const auto solve = [&](const TetMesh& mesh) {
-    auto solution = SolveDeformationModes(Assemble(mesh, kElastic, 1, MassSharing::kConsistent),
-                                          mesh.nodes, 4e4, [](SolveStage, double) {});
-    EXPECT_TRUE(solution.ok()) << solution.status();
-    return *std::move(solution);
-  };
   const TetMesh mesh = Angle(1);
-  const DeformationModes coarse = solve(mesh);
-  const DeformationModes fine = solve(Angle(4));
-  const Eigen::VectorXd errors = EstimateFrequencyErrors(mesh, kElastic, coarse.modes).errors;
-  ASSERT_GE(fine.modes.eigenvalues.size(), 4);
-  ASSERT_GE(errors.size(), 4);
-  for (Eigen::Index m = 0; m < 4; ++m) {
-    const double right = std::sqrt(coarse.modes.eigenvalues[m] / fine.modes.eigenvalues[m]) - 1;
-    EXPECT_GT(right, 1e-3);
-    EXPECT_GT(errors[m], right) << "mode " << m;
-    EXPECT_LT(errors[m], 3 * right) << "mode " << m << ", in truth " << right;
-  }
+  const DeformationModes coarse = ModesBelow(4e4, mesh), fine = ModesBelow(4e4, Angle(4));
+  ExpectErrorsNearTruth(mesh, coarse, fine, 4, {.least = 1, .most = 3, .least_true = 1e-3});
 }
 
 }  // namespace

@@ -89,13 +89,6 @@ TetMesh Rod() {
   return mesh;
 }
 
-DeformationModes Solve(const TetMesh& mesh, double limit) {
-  auto solution = SolveDeformationModes(Assemble(mesh, kMaterials, MassSharing::kConsistent),
-                                        mesh.nodes, limit, [](SolveStage, double) {});
-  EXPECT_TRUE(solution.ok()) << solution.status();
-  return *std::move(solution);
-}
-
 /// How well a mode's motion along x is that of the rod, from 0 to 1.
 double Likeness(const RodMode& rod, const TetMesh& mesh, const Eigen::VectorXd& shape) {
   double product = 0, of_shape = 0, of_rod = 0;
@@ -111,10 +104,17 @@ double Likeness(const RodMode& rod, const TetMesh& mesh, const Eigen::VectorXd& 
 TEST(RegionEnergies, ARodOfTwoMaterialsHasTheFrequenciesAndEnergiesOfTheory) {
   const TetMesh mesh = Rod();
   const std::vector<double> omegas = RodFrequencies(3);
-  const DeformationModes solution = Solve(mesh, 1.1 * omegas.back() * omegas.back());
+  const DeformationModes solution =
+      SolveDeformationModes(Assemble(mesh, kMaterials, MassSharing::kConsistent), mesh.nodes,
+                            1.1 * omegas.back() * omegas.back(), [](SolveStage, double) {})
+          .value();
   const std::vector<ModelRegion> regions = RegionEnergies(mesh, kMaterials, solution.modes);
   ASSERT_EQ(regions.size(), 2U);
   EXPECT_EQ(regions[1].material.region, "soft");
+  for (size_t m = 0; m < regions[0].strain_parts.size(); ++m) {
+    EXPECT_NEAR(regions[0].strain_parts[m] + regions[1].strain_parts[m], 1, 1e-12);
+    EXPECT_NEAR(regions[0].kinetic_parts[m] + regions[1].kinetic_parts[m], 1, 1e-12);
+  }
   for (const double omega : omegas) {
     const RodMode rod(omega);
     Eigen::Index best = 0;
@@ -128,16 +128,6 @@ TEST(RegionEnergies, ARodOfTwoMaterialsHasTheFrequenciesAndEnergiesOfTheory) {
     EXPECT_NEAR(std::sqrt(solution.modes.eigenvalues[best]) / omega, 1, 1e-4) << omega;
     EXPECT_NEAR(regions[0].strain_parts[m], rod.StrainOfFirst(), 1e-3) << omega;
     EXPECT_NEAR(regions[0].kinetic_parts[m], rod.KineticOfFirst(), 1e-3) << omega;
-  }
-}
-
-TEST(RegionEnergies, ThePartsOfAllRegionsAddUpToOne) {
-  const TetMesh mesh = Rod();
-  const DeformationModes solution = Solve(mesh, 30);
-  const std::vector<ModelRegion> regions = RegionEnergies(mesh, kMaterials, solution.modes);
-  for (size_t m = 0; m < regions[0].strain_parts.size(); ++m) {
-    EXPECT_NEAR(regions[0].strain_parts[m] + regions[1].strain_parts[m], 1, 1e-12);
-    EXPECT_NEAR(regions[0].kinetic_parts[m] + regions[1].kinetic_parts[m], 1, 1e-12);
   }
 }
 

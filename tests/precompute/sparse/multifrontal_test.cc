@@ -53,13 +53,10 @@ double SolveResidual(const SystemMatrices& system) {
   return (elastic - shift * inertial - right).norm() / right.norm();
 }
 
-TEST(Multifrontal, SolvesLinearAndQuadraticSystemsInDouble) {
+TEST(Multifrontal, SolvesLinearAndQuadraticSystemsToThePrecisionOfItsNumbers) {
   // The condition number, about 1e7, times the rounding of a double.
   EXPECT_LT(SolveResidual<double>(BoxSystem(4)), 1e-9);
   EXPECT_LT(SolveResidual<double>(BoxSystem(10)), 1e-9);
-}
-
-TEST(Multifrontal, SolvesInFloatToFloatPrecision) {
   EXPECT_LT(SolveResidual<float>(BoxSystem(10)), 1e-1);
   EXPECT_GT(SolveResidual<float>(BoxSystem(10)), 1e-9);
 }
@@ -130,9 +127,9 @@ TEST(CountEigenvaluesBelow, AgreesWithAllEigenvaluesBetweenAnyTwo) {
   for (Eigen::Index i = 6; i + 1 < all.size(); i += 9) {
     if (all[i + 1] - all[i] < 1e-6 * all[i]) continue;
     const auto count = CountEigenvaluesBelow(ordered.fronts, ordered.matrix,
-                                             (all[i] + all[i + 1]) / 2, workers, nullptr);
-    ASSERT_TRUE(count.ok()) << count.status();
-    EXPECT_EQ(*count, i + 1);
+                                             (all[i] + all[i + 1]) / 2, workers, nullptr)
+                           .value();
+    EXPECT_EQ(count, i + 1);
   }
 }
 
