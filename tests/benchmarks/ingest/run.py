@@ -70,11 +70,11 @@ def main():
     parser.add_argument("--sizes", type=int, nargs="*", default=[1, 16, 64, 256], help="impulses a message")
     parser.add_argument("--languages", nargs="*", default=["C++", "Python", "Node"])
     options = parser.parse_args()
-    python = bench.use(options.build)
+    python = bench.use(options.build, "client_sdk/examples/falls")
     # They need the paths of `use`.
     import carillon
     import meshes
-    from node import node_environment
+    from falls import node_environment
     with bench.daemon("--listen", "127.0.0.1:0") as daemon, carillon.connect(daemon.server) as c, c.scene() as scene:
         places = {"socket": daemon.server, "TCP": daemon.listening[-1].split()[-1]}
         environment = {**node_environment(daemon.folder), "PYTHONPATH": ":".join(python)}
