@@ -19,7 +19,6 @@ class IllMade:
     content: bytes
     plain: str
     repaired: str
-    form: str = "obj"
     options: list = field(default_factory=list)
 
 
@@ -115,26 +114,27 @@ def with_t_junctions(part, count):
     return vertices, triangles
 
 
+def where(part, kept):
+    """The triangles whose corners are kept."""
+    return part[0], [t for t in part[1] if kept([part[0][i] for i in t])]
+
+
 def without_lid(part):
     top = max(p[2] for p in part[0])
-    return part[0], [t for t in part[1] if any(part[0][i][2] < top for i in t)]
+    return where(part, lambda corners: any(p[2] < top for p in corners))
 
 
 def plate():
     """An open sheet."""
-    vertices, triangles = box((0.2, 0.1, 1), cells=(12, 6, 1))
-    return vertices, [t for t in triangles if all(vertices[i][2] == 0 for i in t)]
+    return where(box((0.2, 0.1, 1), cells=(12, 6, 1)), lambda corners: all(p[2] == 0 for p in corners))
 
 
 def half_ball():
-    part = ball()
-    return part[0], [t for t in part[1] if all(part[0][i][2] <= 1e-12 for i in t)]
+    return where(ball(), lambda corners: all(p[2] <= 1e-12 for p in corners))
 
 
 def open_tube():
-    part = box(BAR_M, cells=BAR_CELLS)
-    return part[0], [t for t in part[1]
-                     if not any(all(part[0][i][0] == x for i in t) for x in (0, BAR_M[0]))]
+    return where(bar(), lambda corners: not any(all(p[0] == x for p in corners) for x in (0, BAR_M[0])))
 
 
 def moved(part, offset):
@@ -143,10 +143,6 @@ def moved(part, offset):
 
 def scaled(part, factor):
     return [tuple(factor * c for c in p) for p in part[0]], part[1]
-
-
-def pinched():
-    return joined(box((0.1, 0.1, 0.1)), box((0.1, 0.1, 0.1), (0.1, 0.1, 0.1)))
 
 
 def cases():
@@ -186,12 +182,12 @@ def cases():
     add("a spike through the other side",
         (lambda p: (p[0][:-1] + [(0.1, 0.015, -0.05)], p[1]))(bar()), "MESH_SELF_INTERSECTING",
         "model")
-    add("a wall inside", joined(bar(), (lambda p: (p[0], [t for t in p[1] if all(
-        abs(p[0][i][0] - 0.1) < 1e-12 for i in t)]))(box((0.1, 0.03, 0.02), cells=(10, 3, 2)))),
-        "MESH_", "bar")
+    add("a wall inside", joined(bar(), where(box((0.1, 0.03, 0.02), cells=(10, 3, 2)), lambda corners: all(
+        abs(p[0] - 0.1) < 1e-12 for p in corners))), "MESH_", "bar")
     add("two boxes at an edge", joined(box((0.1, 0.1, 0.1)), box((0.1, 0.1, 0.1), (0.1, 0.1, 0))),
         "MESH_", "model")
-    add("two boxes at a corner", pinched(), "MESH_", "model")
+    add("two boxes at a corner", joined(box((0.1, 0.1, 0.1)), box((0.1, 0.1, 0.1), (0.1, 0.1, 0.1))),
+        "MESH_", "model")
     for count in (1, 3):
         add(f"{count} triangles missing", without(bar(), count), "MESH_NOT_CLOSED", "bar")
     add("a triangle of a fine ball missing", without(ball(80), 1), "MESH_NOT_CLOSED", "ball")
