@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -63,9 +62,8 @@ TEST_F(RoundTripTest, KeepsEveryFigureOfAModelAndItsOrigin) {
   origin.settings.set_poisson_ratio(0.33);
   origin.settings.mutable_mesh()->set_wall_m(0.003);
   ASSERT_TRUE(WriteModalModel(path, model, origin).ok());
-  const auto stored = ReadModalModel(path);
-  ASSERT_TRUE(stored.ok()) << stored.status();
-  const ModalModel& read = stored->model;
+  const auto stored = ReadModalModel(path).value();
+  const ModalModel& read = stored.model;
   EXPECT_EQ(read.node_count, model.node_count);
   EXPECT_EQ(read.element_count, model.element_count);
   EXPECT_EQ(read.volume_m3, model.volume_m3);
@@ -83,8 +81,25 @@ TEST_F(RoundTripTest, KeepsEveryFigureOfAModelAndItsOrigin) {
     EXPECT_EQ(read.estimated_errors[m], static_cast<float>(model.estimated_errors[m]));
   }
   EXPECT_EQ(read.poisson_slopes, model.poisson_slopes);
-  EXPECT_EQ(stored->origin.mesh_digest, "4f");
-  EXPECT_EQ(stored->origin.settings.SerializeAsString(), origin.settings.SerializeAsString());
+  EXPECT_EQ(stored.origin.mesh_digest, "4f");
+  EXPECT_EQ(stored.origin.settings.SerializeAsString(), origin.settings.SerializeAsString());
+}
+
+// Arrays of more than a mebibyte are stored in several chunks, of which only the first has the
+// offset zero.
+TEST_F(RoundTripTest, KeepsArraysOfSeveralChunks) {
+  constexpr size_t kTriangles = 200'000;
+  ModalModel model = SmallModel();
+  model.triangles.clear();
+  for (size_t t = 0; t < kTriangles; ++t) {
+    model.triangles.push_back({static_cast<int32_t>(t % 4), 1, 2});
+  }
+  model.given_triangle.assign(kTriangles, 0);
+  ASSERT_TRUE(WriteModalModel(path, model, {}).ok());
+  const auto stored = ReadModalModel(path).value();
+  EXPECT_EQ(stored.model.triangles, model.triangles);
+  EXPECT_EQ(stored.model.vertices, model.vertices);
+  EXPECT_EQ(stored.model.shapes, model.shapes);
 }
 
 TEST_F(RoundTripTest, WritesTheSameBytesAgain) {

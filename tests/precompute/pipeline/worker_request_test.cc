@@ -27,16 +27,15 @@ worker::v1::WorkerRequest Steel() {
 }
 
 TEST(WorkerRequest, ACompleteRequestHasEveryDefault) {
-  const auto complete = Complete(Steel());
-  ASSERT_TRUE(complete.ok()) << complete.status();
-  EXPECT_EQ(complete->size(), 1);
-  EXPECT_EQ(MetresPerUnit(complete->settings()), 1);
-  EXPECT_EQ(MeshingOf(*complete).nodes_per_element, 10);
-  EXPECT_EQ(MassSharingOf(*complete), MassSharing::kConsistent);
-  EXPECT_FALSE(GoalOf(*complete).given());
-  EXPECT_EQ(UseOf(*complete).high_hz, 20'000);
-  EXPECT_TRUE(UseOf(*complete).high_is_default);
-  EXPECT_FALSE(complete->has_transfer());
+  const auto complete = Complete(Steel()).value();
+  EXPECT_EQ(complete.size(), 1);
+  EXPECT_EQ(MetresPerUnit(complete.settings()), 1);
+  EXPECT_EQ(MeshingOf(complete).nodes_per_element, 10);
+  EXPECT_EQ(MassSharingOf(complete), MassSharing::kConsistent);
+  EXPECT_FALSE(GoalOf(complete).given());
+  EXPECT_EQ(UseOf(complete).high_hz, 20'000);
+  EXPECT_TRUE(UseOf(complete).high_is_default);
+  EXPECT_FALSE(complete.has_transfer());
 }
 
 TEST(WorkerRequest, WhatIsAskedForArrivesInTheUnitsOfTheRooms) {
@@ -53,19 +52,18 @@ TEST(WorkerRequest, WhatIsAskedForArrivesInTheUnitsOfTheRooms) {
   request.set_min_frequency_hz(100);
   request.set_max_frequency_hz(1000);
   request.set_cautious(true);
-  const auto complete = Complete(request);
-  ASSERT_TRUE(complete.ok()) << complete.status();
-  const MeshingSettings meshing = MeshingOf(*complete);
+  const auto complete = Complete(request).value();
+  const MeshingSettings meshing = MeshingOf(complete);
   EXPECT_EQ(meshing.target_node_count, 500);
   EXPECT_EQ(meshing.nodes_per_element, 4);
   EXPECT_TRUE(meshing.keep_surface.value());
   EXPECT_TRUE(meshing.cautious);
-  EXPECT_EQ(MassSharingOf(*complete), MassSharing::kLumped);
-  const ResolutionGoal goal = GoalOf(*complete);
+  EXPECT_EQ(MassSharingOf(complete), MassSharing::kLumped);
+  const ResolutionGoal goal = GoalOf(complete);
   EXPECT_EQ(goal.accuracy, 0.01);
   EXPECT_EQ(goal.budget_s, 60);
   EXPECT_EQ(goal.budget_bytes, 1.5 * (1 << 30));
-  const IntendedUse use = UseOf(*complete);
+  const IntendedUse use = UseOf(complete);
   EXPECT_EQ(use.size, 2);
   EXPECT_EQ(use.low_hz, 100);
   EXPECT_EQ(use.high_hz, 1000);

@@ -36,26 +36,20 @@ TEST(RemainingTime, IsThePlanWhereNothingHasBeenMeasured) {
   EXPECT_DOUBLE_EQ(remaining.Seconds(7).value(), 120);
 }
 
-TEST(RemainingTime, IsTrueAtEachPhasesEndWhateverTheMachinesSpeed) {
-  for (const double slowness : {0.2, 1.0, 7.0}) {
+TEST(RemainingTime, FallsAndIsTrueAtEachPhasesEndWhateverTheMachinesSpeed) {
+  for (const double slowness : {0.2, 1.0, 2.5, 7.0}) {
     RemainingTime remaining;
     remaining.BeginRound(0, {});
+    double before = 1e9;
     RunAll(remaining, 3, slowness, [&](double now_s, double left_s) {
+      const double seconds = remaining.Seconds(now_s).value();
       // 0.05 s of the 10 s of the first step are taken on trust.
-      EXPECT_NEAR(remaining.Seconds(now_s).value(), left_s, 0.03 * left_s + 1e-9);
+      EXPECT_NEAR(seconds, left_s, 0.03 * left_s + 1e-9);
+      EXPECT_LT(seconds, before);
+      before = seconds;
     });
+    EXPECT_DOUBLE_EQ(before, 0);
   }
-}
-
-TEST(RemainingTime, FallsFromPhaseToPhase) {
-  RemainingTime remaining;
-  remaining.BeginRound(0, {});
-  double before = 1e9;
-  RunAll(remaining, 0, 2.5, [&](double now_s, double) {
-    EXPECT_LT(remaining.Seconds(now_s).value(), before);
-    before = remaining.Seconds(now_s).value();
-  });
-  EXPECT_DOUBLE_EQ(before, 0);
 }
 
 TEST(RemainingTime, ANewPlanKeepsTheMeasuredSpeed) {
