@@ -4,9 +4,10 @@
 // Usage: golden SERVER MODEL TRACE SAMPLES
 
 #include <carillon/client.h>
+#include <google/protobuf/text_format.h>
 
+#include <cstdlib>
 #include <fstream>
-#include <initializer_list>
 #include <iostream>
 #include <string>
 
@@ -16,106 +17,92 @@ using carillon::client::ContactTraceReader;
 using carillon::client::ContactTraceWriter;
 
 constexpr double kStepS = 1.0 / 64;
-
-carillon::v1::ContactTraceHeader MakeHeader() {
-  carillon::v1::ContactTraceHeader header;
-  header.set_simulator("golden");
-  header.set_step_s(kStepS);
-  header.set_frame(carillon::v1::FRAME_OBJECT);
-  return header;
-}
-
-carillon::v1::ContactTraceObject MakeBar(uint32_t handle, const std::string& model,
-                                         const std::string& label) {
-  carillon::v1::ContactTraceObject bar;
-  bar.set_handle(handle);
-  bar.set_modal_model(model);
-  bar.mutable_material()->set_preset("chime_aluminum");
-  bar.set_label(label);
-  bar.set_radiation(carillon::v1::RADIATION_MODEL_PAPER_COUPLING);
-  bar.set_size(1);
-  bar.set_gain(1);
-  return bar;
-}
-
-void WriteBars(const std::string& model, ContactTraceWriter& trace) {
-  carillon::v1::ContactTraceObject low = MakeBar(1, model, "low");
-  low.set_size(2);
-  trace.Write(low);
-  carillon::v1::ContactTraceObject high = MakeBar(2, model, "high");
-  high.set_gain(0.5);
-  high.mutable_pose()->mutable_position_m()->set_x(1);
-  high.mutable_pose()->mutable_position_m()->set_z(0.5);
-  high.mutable_pose()->mutable_orientation()->set_y(1);
-  trace.Write(high);
-}
-
-struct Row {
-  uint32_t object;
-  std::initializer_list<float> point_m;
-  std::initializer_list<float> impulse_newton_seconds;
-};
-
-void Add(const Row& row, carillon::v1::ContactColumns& columns) {
-  columns.add_object(row.object);
-  columns.mutable_point_m()->Add(row.point_m.begin(), row.point_m.end());
-  columns.mutable_impulse_newton_seconds()->Add(row.impulse_newton_seconds.begin(),
-                                                row.impulse_newton_seconds.end());
-}
-
-carillon::v1::ContactStep Knock() {
-  carillon::v1::ContactStep step;
-  carillon::v1::ContactColumns& impacts = *step.add_contact_columns();
-  impacts.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
-  Add({1, {0, 0.008F, 0.02F}, {0, 0.125F, -0.25F}}, impacts);
-  impacts.mutable_hertz()->set_striker("wood");
-  return step;
-}
-
+constexpr const char* kHeader = R"pb(simulator: "golden" step_s: 0.015625 frame: FRAME_OBJECT)pb";
+constexpr const char* kLow = R"pb(
+  handle: 1
+  material { preset: "chime_aluminum" }
+  radiation: RADIATION_MODEL_PAPER_COUPLING
+  label: "low"
+  size: 2
+  gain: 1
+)pb";
+constexpr const char* kHigh = R"pb(
+  handle: 2
+  material { preset: "chime_aluminum" }
+  radiation: RADIATION_MODEL_PAPER_COUPLING
+  label: "high"
+  size: 1
+  gain: 0.5
+  pose {
+    position_m { x: 1 z: 0.5 }
+    orientation { y: 1 }
+  }
+)pb";
+constexpr const char* kKnock = R"pb(
+  contact_columns {
+    kind: CONTACT_KIND_IMPACT
+    object: 1
+    point_m: [ 0, 0.008, 0.02 ]
+    impulse_newton_seconds: [ 0, 0.125, -0.25 ]
+    hertz { striker: "wood" }
+  }
+)pb";
 /// What an engine reports in a step: the low bar rests, and the high one slides.
-carillon::v1::ContactStep Slide(int number) {
-  carillon::v1::ContactStep step;
-  step.set_time_s(number * kStepS);
-  carillon::v1::ContactColumns& contacts = *step.add_contact_columns();
-  contacts.set_kind(carillon::v1::CONTACT_KIND_REPORTED);
-  Add({1, {0.125F, 0.016F, 0}, {0, 0, 0.0625F}}, contacts);
-  Add({2, {0.0625F, 0, 0.01F}, {0, static_cast<float>(number) / 256, -0.03125F}}, contacts);
-  for (const uint32_t partner : {0U, 9U}) contacts.add_partner(partner);
-  for (const float speed : {0.0F, 0.5F}) contacts.add_travel_speed_m_per_s(speed);
-  contacts.set_roughness_depth(0.25);
-  contacts.set_irregularity_length_m(0.001);
-  return step;
-}
+constexpr const char* kSlide = R"pb(
+  contact_columns {
+    kind: CONTACT_KIND_REPORTED
+    object: [ 1, 2 ]
+    point_m: [ 0.125, 0.016, 0, 0.0625, 0, 0.01 ]
+    impulse_newton_seconds: [ 0, 0, 0.0625, 0, 0, -0.03125 ]
+    partner: [ 0, 9 ]
+    travel_speed_m_per_s: [ 0, 0.5 ]
+    roughness_depth: 0.25
+    irregularity_length_m: 0.001
+  }
+)pb";
+constexpr const char* kPause = R"pb(time_s: 0.25 time_scale: 0)pb";
+constexpr const char* kCollision = R"pb(
+  time_s: 0.5
+  time_scale: 0.5
+  contact_columns {
+    kind: CONTACT_KIND_IMPACT
+    object: 1
+    point_m: [ 0.25, 0, 0.01 ]
+    impulse_newton_seconds: [ 0, 0.5, 0 ]
+    duration_s: 0.0009765625
+    time_offset_s: 0.0078125
+    second_object: 2
+    second_point_m: [ 0, 0, 0 ]
+  }
+)pb";
 
-carillon::v1::ContactStep Pause() {
-  carillon::v1::ContactStep step;
-  step.set_time_s(0.25);
-  step.set_time_scale(0);
-  return step;
-}
-
-carillon::v1::ContactStep Collision() {
-  carillon::v1::ContactStep step;
-  step.set_time_s(0.5);
-  step.set_time_scale(0.5);
-  carillon::v1::ContactColumns& columns = *step.add_contact_columns();
-  columns.set_kind(carillon::v1::CONTACT_KIND_IMPACT);
-  Add({1, {0.25F, 0, 0.01F}, {0, 0.5F, 0}}, columns);
-  columns.add_duration_s(0.0009765625F);
-  columns.add_time_offset_s(0.0078125F);
-  columns.add_second_object(2);
-  for (int i = 0; i < 3; ++i) columns.add_second_point_m(0);
-  return step;
+template <typename Message>
+Message Parse(const char* text) {
+  Message message;
+  if (!google::protobuf::TextFormat::ParseFromString(text, &message)) std::abort();
+  return message;
 }
 
 absl::Status WriteTrace(const std::string& model, const std::string& file) {
-  absl::StatusOr<ContactTraceWriter> trace = ContactTraceWriter::Create(file, MakeHeader());
+  auto trace = ContactTraceWriter::Create(file, Parse<carillon::v1::ContactTraceHeader>(kHeader));
   if (!trace.ok()) return trace.status();
-  WriteBars(model, *trace);
-  absl::Status written = trace->Write(Knock());
-  for (int number = 1; number <= 16; ++number) written.Update(trace->Write(Slide(number)));
-  written.Update(trace->Write(Pause()));
-  written.Update(trace->Write(Collision()));
+  absl::Status written;
+  for (const char* text : {kLow, kHigh}) {
+    auto bar = Parse<carillon::v1::ContactTraceObject>(text);
+    bar.set_modal_model(model);
+    trace->Write(bar);
+  }
+  written.Update(trace->Write(Parse<carillon::v1::ContactStep>(kKnock)));
+  for (int number = 1; number <= 16; ++number) {
+    auto slide = Parse<carillon::v1::ContactStep>(kSlide);
+    slide.set_time_s(number * kStepS);
+    slide.mutable_contact_columns(0)->set_impulse_newton_seconds(4,
+                                                                 static_cast<float>(number) / 256);
+    written.Update(trace->Write(slide));
+  }
+  for (const char* text : {kPause, kCollision}) {
+    written.Update(trace->Write(Parse<carillon::v1::ContactStep>(text)));
+  }
   written.Update(trace->Close());
   return written;
 }
