@@ -44,42 +44,14 @@ async function withScene(use) {
   }
 }
 
-/** The sound of steps [time, content] on `count` bars. */
-function rendered(steps, { count = 1, poses = [], ...settings } = {}) {
-  const trace = new carillon.Trace({ step: 1 / 240, ...settings });
-  for (let i = 0; i < count; i += 1) trace.add(model, { pose: poses[i] });
-  for (const [time, content] of steps) trace.step(time, content);
-  return c.render(trace, { tailS: 0.3 });
-}
-
-function loudestHz({ samples, sampleRateHz }) {
-  const count = 1 << 14;
-  let best = { power: 0, hz: 0 };
-  for (let bin = 1; bin < 2000; bin += 1) {
-    let re = 0;
-    let im = 0;
-    for (let i = 0; i < count; i += 1) {
-      re += samples[i] * Math.cos((2 * Math.PI * bin * i) / count);
-      im += samples[i] * Math.sin((2 * Math.PI * bin * i) / count);
-    }
-    if (re * re + im * im > best.power) best = { power: re * re + im * im, hz: (bin * sampleRateHz) / count };
-  }
-  return best.hz;
-}
-
-test('a mesh of arrays is a model of the same modes as its file', async () => {
-  const text = await fs.readFile(BAR, 'utf8');
-  const rows = (kind) => text.split('\n').filter((line) => line.startsWith(kind))
-    .map((line) => line.split(' ').slice(1).map(Number));
-  const triangles = rows('f ').map((row) => row.map((i) => i - 1));
+test('the progress of a model is told, it has its unit, and it is found by a part of its label', async () => {
   const states = [];
-  const same = await c.createModel({ vertices: rows('v '), triangles }, {
-    material, label: 'arrays', onProgress: (job) => states.push(job.state) });
-  assert.equal(same.modeCount, model.modeCount);
+  const large = await c.createModel(BAR, { material, unit: 1.5, label: 'large', onProgress: (job) => states.push(job.state) });
   assert.equal(states.at(-1), 'JOB_STATE_SUCCEEDED');
+  assert.ok(Math.abs(large.summary.header.volumeM3 / model.summary.header.volumeM3 / 1.5 ** 3 - 1) < 1e-6);
   const found = [];
-  for await (const one of c.models({ labelContains: 'arr' })) found.push(one.name);
-  assert.deepEqual(found, same.name === model.name ? found : [same.name]);
+  for await (const one of c.models({ labelContains: 'arg' })) found.push(one.name);
+  assert.deepEqual(found, [large.name]);
 });
 
 test('mistakes with models and files are told, and a model is found by its label and by the first digits of its digest', async () => {
@@ -103,16 +75,6 @@ test('mistakes with models and files are told, and a model is found by its label
   await assert.rejects(c.model(5), /^TypeError: the model is 5; it must be its label/);
 });
 
-test('a mesh has the unit and the accuracy that are asked for', async () => {
-  const text = (await fs.readFile(BAR, 'utf8')).split('\n').map((line) => line.split(' '))
-    .map(([kind, ...words]) => (kind === 'v' ? ['v', ...words.map((word) => 1000 * word)] : [kind, ...words]).join(' '));
-  const file = path.join(FOLDER, 'bar_mm.obj');
-  await fs.writeFile(file, text.join('\n'));
-  const { settings, volumeM3: volume } = (await c.createModel(file, { material, unit: 'mm', accuracy: 0.05 })).summary.header;
-  assert.deepEqual([settings.metresPerUnit, settings.mesh.accuracy], [0.001, 0.05]);
-  assert.ok(Math.abs(volume / model.summary.header.volumeM3 - 1) < 1e-6);
-});
-
 test('a glTF brings the file with its data', async () => {
   const file = process.env.CARILLON_TEST_GLTF;
   assert.equal((await c.createModel(file, { material })).modeCount, model.modeCount);
@@ -129,25 +91,20 @@ test('the daemon says what it is', async () => {
   assert.ok(info.uptimeS > 0);
 });
 
-test('a rendered strike rings at the lowest bending mode, and is the same again', async () => {
+test('a rendered strike is the same again, and is saved', async () => {
   const once = await model.renderStrike({ ...STRIKE, seconds: 1 });
   const again = await model.renderStrike({ ...STRIKE, seconds: 1 });
   assert.ok(once.peak > 1e-4);
   assert.deepEqual(again.samples, once.samples);
-  const lowest = Math.sqrt(model.summary.eigenvalues[0] * 6.835179e10 / 2700) / (2 * Math.PI);
-  assert.ok(Math.abs(loudestHz(once) / lowest - 1) < 0.01, `${loudestHz(once)} Hz, not ${lowest}`);
   const file = path.join(FOLDER, 'node.wav');
   await once.save(file);
   assert.equal((await fs.stat(file)).size, 44 + 3 * once.samples.length);
 });
 
 test('a scene with two ears warns if the daemon plays one channel', async () => {
-  const told = [];
-  const listener = (warning) => told.push(`${warning.name}: ${warning.message}`);
-  process.on('warning', listener);
-  for (const hearing of [{ panning: true }, { distanceGain: true }]) await (await c.createScene({ hearing })).delete();
-  await new Promise(setImmediate);
-  process.off('warning', listener);
+  const told = await warningsOf(async () => {
+    for (const hearing of [{ panning: true }, { distanceGain: true }]) await (await c.createScene({ hearing })).delete();
+  });
   assert.equal(told.length, 1);
   assert.match(told[0], /^HearingWarning: scenes\/\d+ has panning or two ears, but the daemon plays one channel, .*--channels 2`$/);
 });
@@ -180,37 +137,20 @@ test('jobs are watched and listed by state and label', async () => {
   for await (const job of c.jobs({ states: ['cancelled'] })) assert.fail(job.name);
 });
 
-test('a live strike is heard', async () => {
-  const heard = await withScene(async (scene) => {
-    const bar = await scene.add(model);
-    const record = await c.listen();
-    await bar.strike(STRIKE);
-    return record.take(1.5);
-  });
-  assert.equal(heard.samples.length, 72000);
-  assert.ok(heard.peak > 1e-4);
-});
-
 test('contacts in rows sound as the same in columns', async () => {
   // Numbers that a float holds exactly, because columns are floats.
   const blow = IMPULSE.map((x) => 10 * x); // far above the weight of the bar
   const [point, impulse] = [POINT, blow].map((values) => Array.from(Float32Array.from(values)));
   const rows = [{ object: 1, point, impulse, partner: 7 }];
   const columns = { objects: 1, points: Float32Array.from(POINT), impulses: [blow], partners: [7] };
-  const [one, other] = await Promise.all([rows, columns].map((contacts) => rendered(
-    [0, 1, 2].map((i) => [i / 240, { contacts }]))));
+  const [one, other] = await Promise.all([rows, columns].map((contacts) => {
+    const trace = new carillon.Trace({ step: 1 / 240 });
+    trace.add(model);
+    for (const i of [0, 1, 2]) trace.step(i / 240, { contacts });
+    return c.render(trace, { tailS: 0.3 });
+  }));
   assert.ok(one.peak > 1e-5);
   assert.deepEqual(one.samples, other.samples);
-});
-
-test('points in the frame of the scene are turned into that of the object', async () => {
-  const own = await rendered([[0, { impacts: [{ object: 1, ...STRIKE }] }]]);
-  const half = Math.SQRT1_2; // a quarter turn about z: x of the object is y of the scene
-  const [x, y, z] = POINT;
-  const turned = { object: 1, ...STRIKE, point: [1 - y, 2 + x, 3 + z] };
-  const scene = await rendered([[0, { impacts: [turned] }]], { frame: 'scene',
-    poses: [{ position: [1, 2, 3], orientation: [half, 0, 0, half] }] });
-  assert.ok(own.samples.every((sample, i) => Math.abs(sample - scene.samples[i]) < 1e-5 * own.peak));
 });
 
 test('a stream counts, and tells what was wrong', async () => {
@@ -249,18 +189,15 @@ test('a material by region reaches the mesh', async () => {
 });
 
 test('contacts that come late are told once', async () => withScene(async (scene) => {
-  const told = [];
-  const listener = (warning) => told.push(warning.code);
-  process.on('warning', listener);
   await scene.add(model, { handle: 1 });
   const stream = scene.stream({ step: 1 / 240, delay: 0 });
-  await stream.step(0);
-  await (await c.listen()).take(0.1);
-  await stream.step(0, { impacts: [{ object: 1, ...STRIKE }] });
-  await stream.close();
-  await new Promise(setImmediate);
-  process.off('warning', listener);
-  assert.deepEqual(told, ['CONTACTS_LATE']);
+  const told = await warningsOf(async () => {
+    await stream.step(0);
+    await (await c.listen()).take(0.1);
+    await stream.step(0, { impacts: [{ object: 1, ...STRIKE }] });
+    await stream.close();
+  });
+  assert.deepEqual(told.map((line) => line.split(': ')[1]), ['CONTACTS_LATE']);
   assert.deepEqual(stream.warnings.map(({ count, figures }) => [count, figures]), [[1, { scheduling_delay_s: 0 }]]);
   assert.deepEqual([stream.lateCount, stream.remapCount], [1, 0]);
 }));
@@ -287,13 +224,6 @@ test('a stream that was closed refuses further steps', async () => withScene(asy
   assert.throws(() => stream.step(1), (error) => error.reason === 'CONTACT_STREAM_ENDED'
     && error.message.includes('open another one'));
 }));
-
-test('a trace without contacts is refused', async () => {
-  const trace = new carillon.Trace({ step: 1 / 60 });
-  trace.add(model);
-  trace.step(0);
-  await assert.rejects(c.render(trace), { reason: 'TRACE_EMPTY' });
-});
 
 test('more renderings than a client may have wait', async () => {
   const sounds = await Promise.all(Array.from({ length: 16 }, () => model.renderStrike({ ...STRIKE, seconds: 0.1 })));
