@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Certificates for tests, made by the program openssl."""
+"""Certificates for tests, made by the program openssl, and daemons that know their callers over TCP."""
 
+import hashlib
 import pathlib
 import subprocess
+
+from daemon import ScratchTest
 
 CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
 CONFIGURATION = """
@@ -55,3 +58,28 @@ class Authority:
                 "-keyfile", self.key, "-startdate", "20200101000000Z", "-enddate", end, "-in", request,
                 "-out", certificate)
         return certificate, key
+
+
+def access_line(name, roles, token):
+    """What an access file says of those who show this token."""
+    return f"{name} {roles} sha256:{hashlib.sha256(token.encode()).hexdigest()}\n"
+
+
+class SecuredTest(ScratchTest):
+    """Serves over TLS, at `address`, to those that its access file names."""
+
+    def setUp(self):
+        super().setUp()
+        self.authority = Authority(self.folder)
+        self.certificate, self.key = self.authority.issue("server")
+        self.access = self.folder / "access"
+
+    def write_access(self, *lines):
+        self.access.touch(0o600)
+        self.access.write_text("# who may do what\n" + "".join(lines))
+
+    def serve_secured(self, *lines):
+        self.write_access(*lines)
+        self.serve("--listen", "127.0.0.1:0", "--tls-certificate", self.certificate, "--tls-key", self.key,
+                   "--tls-client-roots", self.authority.certificate, "--access-file", self.access)
+        self.address = self.daemon.listening[1].split()[-1]

@@ -51,6 +51,14 @@ SCHEMA = {
             "properties": {"count": {"type": "integer", "minimum": 1}}}}}}
 
 
+def write_binary(path, document, buffer):
+    """Writes a binary file, which holds the buffer."""
+    text = json.dumps(document | {"buffers": [{"byteLength": len(buffer)}]}).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(buffer), len(text), 0x4e4f534a) + text
+                     + struct.pack("<II", len(buffer), 0x004e4942) + buffer)
+
+
 def read(path):
     """(JSON, buffer) of a binary file, or of a text file with its buffer in a data URI."""
     data = path.read_bytes()
@@ -91,7 +99,7 @@ class Writer:
         self.buffer += data + bytes(-len(data) % 4)
         self.accessors.append({
             "bufferView": len(self.views) - 1, "componentType": kind, "count": len(numbers),
-            "type": "VEC3" if numbers.ndim == 2 else "SCALAR"})
+            "type": f"VEC{numbers.shape[1]}" if numbers.ndim == 2 else "SCALAR"})
         if numbers.ndim == 2:
             self.accessors[-1] |= {"min": numbers.min(0).tolist(), "max": numbers.max(0).tolist()}
         return len(self.accessors) - 1

@@ -2,9 +2,7 @@
 """Small bodies as OBJ files, good and bad ones."""
 
 import itertools
-import json
 import math
-import struct
 
 MATERIAL = "chime_aluminum"
 YOUNG_PA, DENSITY, ALPHA1_S = 6.835179e10, 2700, 1e-7  # of that preset
@@ -26,26 +24,8 @@ def box(size, low=(0, 0, 0)):
     return [tuple(l + s * c for l, s, c in zip(low, size, corner)) for corner in corners], BOX_FACES
 
 
-def gltf_with_buffer(size, folder, name="box"):
-    """Writes a box as NAME.gltf, whose data is in the file NAME.bin beside it, into the folder. The .gltf file."""
-    vertices, faces = box(size)
-    corners = [index for face in faces for index in face]
-    data = struct.pack(f"<{3 * len(vertices)}f", *(x for vertex in vertices for x in vertex))
-    points = len(data)
-    data += struct.pack(f"<{len(corners)}H", *corners)
-    (folder / f"{name}.bin").write_bytes(data)
-    document = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"byteLength": len(data), "uri": f"{name}.bin"}],
-        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": points},
-                        {"buffer": 0, "byteOffset": points, "byteLength": len(data) - points}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3",
-                       "min": [0, 0, 0], "max": list(size)},
-                      {"bufferView": 1, "componentType": 5123, "count": len(corners), "type": "SCALAR"}]}
-    file = folder / f"{name}.gltf"
-    file.write_text(json.dumps(document))
-    return file
+def centred_box(size):
+    return box(size, [-side / 2 for side in size])
 
 
 def joined(*parts):
@@ -86,33 +66,6 @@ def bar_first_bending_hz():
     length, _, height = BAR_SIZE
     return (4.730041**2 / (2 * math.pi * length**2)
             * math.sqrt(YOUNG_PA * height**2 / (12 * DENSITY)))
-
-
-TUBE_RADIUS = 0.0125
-
-
-def tube(length=0.3, wall=0.001, around=24, along=28):
-    """A chime, centred, about z; its polygon has the circle's area."""
-    angle = 2 * math.pi / around
-    correction = math.sqrt(angle / math.sin(angle))
-    vertices = [
-        (r * correction * math.cos(i * angle), r * correction * math.sin(i * angle),
-         length * (ring / along - 0.5))
-        for r in (TUBE_RADIUS, TUBE_RADIUS - wall) for ring in range(along + 1) for i in range(around)]
-    inner = (along + 1) * around
-    faces = []
-
-    def band(low, high):
-        for i in range(around):
-            j = (i + 1) % around
-            faces.extend(((low + i, low + j, high + j), (low + i, high + j, high + i)))
-
-    for ring in range(along):
-        band(ring * around, (ring + 1) * around)
-        band(inner + (ring + 1) * around, inner + ring * around)
-    band(inner, 0)
-    band(along * around, inner + along * around)
-    return obj(vertices, faces)
 
 
 def bowl(radius=0.08, wall=0.004, around=48, down=12):

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A shell script in the place of carillon-precompute, and what it leaves behind."""
 
+import contextlib
 import pathlib
+import sqlite3
 import subprocess
 
 import meshes
-from carillon.v1 import modal_model_pb2
+from carillon.v1 import decomposition_pb2, modal_model_pb2
 from daemon import BIN
 from google.protobuf.internal.decoder import _DecodeVarint32
 from google.protobuf.internal.encoder import _VarintBytes
@@ -35,11 +37,11 @@ def worker(folder, body):
     return path
 
 
-def make_model(folder, band="20:20000"):
+def make_model(folder):
     """A file with the model of the bar."""
     mesh, model = pathlib.Path(folder) / "bar.obj", pathlib.Path(folder) / "bar.model"
     mesh.write_bytes(meshes.bar())
-    subprocess.run([BIN / "carillon-precompute", mesh, "--material", meshes.MATERIAL, "--band", band,
+    subprocess.run([BIN / "carillon-precompute", mesh, "--material", meshes.MATERIAL, "--band", "20:20000",
                     "--out", model], check=True, capture_output=True)
     return model
 
@@ -58,6 +60,14 @@ def delimited(record):
     """A record as it stands in a file."""
     data = record.SerializeToString()
     return _VarintBytes(len(data)) + data
+
+
+def stored(folder):
+    """(models, revisions ever stored, jobs that did not succeed) in the database of the daemon in a folder."""
+    with contextlib.closing(sqlite3.connect(folder / "data/carillon.db")) as database:
+        return tuple(database.execute(f"SELECT {figure}").fetchone()[0] for figure in (
+            "count(*) FROM models", "seq FROM sqlite_sequence WHERE name = 'models'",
+            f"count(*) FROM jobs WHERE state != {decomposition_pb2.JOB_STATE_SUCCEEDED}"))
 
 
 def processes_of(folder):

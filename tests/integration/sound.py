@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contact traces to the daemon's sound, and that sound in numbers."""
+"""The daemon's sound in numbers."""
 
-import json
 import wave
 from collections import namedtuple
 
 import numpy
-from google.protobuf.internal.encoder import _VarintBytes
 
-from carillon.v1 import contact_pb2, contact_trace_pb2
+from carillon.v1 import contact_pb2
 
 RATE = 48000
 
@@ -23,19 +21,6 @@ def impulse(point, force, handle=1, duration_s=0.0):
         duration_s=duration_s)
 
 
-def write_trace(path, objects, steps, step_s=0.01, **header_fields):
-    """A trace as any simulator would write it: each record after its length."""
-    record = contact_trace_pb2.ContactTraceRecord
-    header = contact_trace_pb2.ContactTraceHeader(format_version=1, simulator="test",
-                                                  step_s=step_s, **header_fields)
-    records = [record(header=header)]
-    records += [record(object=o) for o in objects]
-    records += [record(step=s) for s in steps]
-    with open(path, "wb") as out:
-        for item in map(record.SerializeToString, records):
-            out.write(_VarintBytes(len(item)) + item)
-
-
 def read_wave(path):
     """(frames, channels) of a 24-bit WAV file, full scale 1."""
     with wave.open(str(path), "rb") as file:
@@ -45,15 +30,6 @@ def read_wave(path):
     words = numpy.zeros((len(bytes_) // 3, 4), numpy.uint8)
     words[:, 1:] = bytes_.reshape(-1, 3)
     return words.view("<i4").reshape(-1, channels) / 2**31
-
-
-def render(daemon, objects, steps, tail_s, **header_fields):
-    """Renders through the command line; (samples of the first channel, summary)."""
-    trace, out = daemon.folder / "trace.contacts", daemon.folder / "trace.wav"
-    write_trace(trace, objects, steps, **header_fields)
-    printed = daemon.command("--json", "render", trace, "--out", out, "--sample-rate", RATE,
-                             "--tail", tail_s)
-    return read_wave(out)[:, 0], json.loads(printed.stdout)
 
 
 def measure(samples, frequency_hz, begin_s, end_s, smoothing_s=0.01):

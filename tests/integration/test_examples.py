@@ -3,14 +3,12 @@
 
 import argparse
 import json
-import pathlib
 import sys
-import unittest
 
 import numpy
 
 import carillon
-from daemon import ROOT, DaemonTest
+from daemon import BUILD, ROOT, DaemonTest
 
 sys.path.insert(0, str(ROOT / "client_sdk/examples/falls"))
 import bunnies  # noqa: E402
@@ -18,20 +16,12 @@ import falls  # noqa: E402
 import run  # noqa: E402
 import scene_makers  # noqa: E402
 
-BUILD = pathlib.Path(run.os.environ["CARILLON_BUILD_DIR"])
-
 
 class ExamplesTest(DaemonTest):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        cls.carillon = carillon.connect(cls.daemon.server)
-        cls.addClassCleanup(cls.carillon.close)
-
     def run_example(self, name, engine, seconds, rate=240, max_frequency=3000):
         options = argparse.Namespace(name=name, engine=engine, rate=rate, seconds=seconds, build=BUILD, video=False,
                                      max_frequency=max_frequency)
-        sound = run.run(self.carillon, options, self.folder)
+        sound = run.run(self.c, options, self.folder)
         for suffix in (".contacts", ".wav", "-spectrogram.png", "-spectrum.png"):
             self.assertGreater((self.folder / f"{name}-{engine}{suffix}").stat().st_size, 1000)
         self.assertGreater(sound.summary.findings.blow_count, 0)
@@ -61,7 +51,7 @@ class ExamplesTest(DaemonTest):
         for alone in range(5):
             for number, body in enumerate(trace.objects):
                 body.gain = gains[number] if number == alone else 0
-            peaks.append(self.carillon.render(trace, sample_rate_hz=48000, tail_s=0.1).peak)
+            peaks.append(self.c.render(trace, sample_rate_hz=48000, tail_s=0.1).peak)
         print("peaks of the shelves and the bunnies:", *(f"{peak:.2g}" for peak in peaks), flush=True)
         self.assertGreater(min(peaks), 1e-3 * max(peaks))
 
@@ -98,7 +88,3 @@ class ExamplesTest(DaemonTest):
         numpy.testing.assert_allclose(area, 4 * numpy.pi, rtol=0.01)
         numpy.testing.assert_allclose(centre, 0, atol=1e-12)
         numpy.testing.assert_allclose(inertia, 2 / 3 * numpy.eye(3), atol=0.01)
-
-
-if __name__ == "__main__":
-    unittest.main()

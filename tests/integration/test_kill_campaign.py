@@ -4,27 +4,23 @@
 CARILLON_KILLS says how often (200 is the whole campaign), CARILLON_SEED repeats one.
 """
 
+import contextlib
 import itertools
 import os
-import pathlib
 import random
 import sqlite3
-import tempfile
 import threading
 import time
-import unittest
 
 import grpc
 
 import meshes
 import scripted
-from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_pb2
-from carillon.v1 import modal_model_service_pb2
-from daemon import Daemon
+from carillon.v1 import decomposition_pb2, modal_model_pb2, modal_model_service_pb2
+from daemon import MATERIAL, ScratchTest, wait_until
 
 KILL_COUNT = int(os.environ.get("CARILLON_KILLS", "6"))
 SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
-MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 
 # Between 0 and 80 ms of work, then a model; what began and what ended is written down.
 WORKER = """echo $nodes >>"$here/began"
@@ -41,7 +37,7 @@ class Writers:
     def __init__(self, records):
         self.records = records
         self.numbers = itertools.count(1)
-        self.models, self.jobs = {}, set()
+        self.models, self.jobs = {}, {}
         self.begun_count = 0
 
     def run(self, daemon, duration_s, rng):
@@ -85,28 +81,16 @@ class Writers:
             mesh=modal_model_pb2.MeshSettings(target_node_count=next(self.numbers)))
         job = client.models.CreateModalModel(modal_model_service_pb2.CreateModalModelRequest(
             mesh_digest=mesh_digest, mesh_format="obj", material=MATERIAL, settings=settings)).job
-        self.jobs.add(job.name)
+        self.jobs[job.name] = job
         if job.state == decomposition_pb2.JOB_STATE_QUEUED:
             client.wait(job)
 
 
-class KillCampaign(unittest.TestCase):
+class KillCampaign(ScratchTest):
     def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
+        super().setUp()
         self.records = scripted.read_records(scripted.make_model(self.folder))
         self.rng = random.Random(SEED)
-
-    def listed(self, client):
-        names, token = [], ""
-        while True:
-            page = client.models.ListModalModels(
-                modal_model_service_pb2.ListModalModelsRequest(page_size=1000, page_token=token))
-            names += [model.name for model in page.modal_models]
-            token = page.next_page_token
-            if not token:
-                return names
 
     def exported(self, client, name):
         """The records of a model; the daemon checks each hash on the way."""
@@ -115,7 +99,7 @@ class KillCampaign(unittest.TestCase):
 
     def check_models(self, client, writers, known):
         """Every acknowledged model is there, and every model there, acknowledged or not, is whole."""
-        listed = self.listed(client)
+        listed = [model.name for model in client.list(page_size=1000)]
         self.assertEqual(len(listed), len(set(listed)))
         self.assertLessEqual(set(writers.models), set(listed))
         for name in set(listed) - known:
@@ -125,47 +109,27 @@ class KillCampaign(unittest.TestCase):
             self.assertEqual(records, expected)
         known.update(listed)
 
-    def assert_no_child_left(self):
-        deadline = time.monotonic() + 5
-        while scripted.processes_of(self.folder / "data") and time.monotonic() < deadline:
-            os.sched_yield()
-        self.assertEqual(scripted.processes_of(self.folder / "data"), [])
-
     def lines(self, name):
         path = self.folder / name
         return path.read_text().split() if path.exists() else []
 
     def test_nothing_acknowledged_is_lost_or_partial_and_every_job_ends_once(self):
-        daemon = Daemon(self.folder, "--precompute", scripted.worker(self.folder, WORKER))
-        self.addCleanup(daemon.stop)
+        self.serve("--precompute", scripted.worker(self.folder, WORKER))
         writers, known = Writers(self.records), set()
         for _ in range(KILL_COUNT):
-            writers.run(daemon, 0.4, self.rng)
-            self.assert_no_child_left()
-            daemon.start()
-            self.check_models(daemon.client(), writers, known)
-        client = daemon.client()
-        for name in writers.jobs:
-            client.wait(client.jobs.GetJob(decomposition_service_pb2.GetJobRequest(name=name)).job)
+            writers.run(self.daemon, 0.4, self.rng)
+            wait_until(lambda: not scripted.processes_of(self.folder / "data"), 5)
+            self.daemon.start()
+            self.check_models(self.daemon.client(), writers, known)
+        client = self.daemon.client()
+        for job in writers.jobs.values():
+            client.wait(job)
         self.check_models(client, writers, known)
-        self.assertEqual(daemon.stop(), 0)
-        self.check_file()
+        self.assertEqual(self.daemon.stop(), 0)
+        # Had a model been stored again, a revision would be missing.
+        self.assertEqual(scripted.stored(self.folder), (len(known), len(known), 0))
+        with contextlib.closing(sqlite3.connect(self.folder / "data/carillon.db")) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchall(), [("ok",)])
         print(f"\nseed {SEED}: {KILL_COUNT} kills, {len(writers.models)} of {writers.begun_count} imports and "
               f"{len(writers.jobs)} jobs acknowledged, {len(known)} models whole; "
               f"{len(self.lines('began'))} runs begun, {len(self.lines('ended'))} ended")
-
-    def check_file(self):
-        database = sqlite3.connect(self.folder / "data/carillon.db")
-        self.addCleanup(database.close)
-        self.assertEqual(database.execute("PRAGMA integrity_check").fetchall(), [("ok",)])
-        stored, = database.execute("SELECT count(*) FROM models").fetchone()
-        # Revisions are never used twice: had a model been stored again, one would be missing here.
-        last, = database.execute("SELECT seq FROM sqlite_sequence WHERE name = 'models'").fetchone()
-        self.assertEqual(last, stored)
-        unfinished, = database.execute("SELECT count(*) FROM jobs WHERE state != ?",
-                                       (decomposition_pb2.JOB_STATE_SUCCEEDED,)).fetchone()
-        self.assertEqual(unfinished, 0)
-
-
-if __name__ == "__main__":
-    unittest.main()

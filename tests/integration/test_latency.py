@@ -21,13 +21,11 @@ class LatencyTest(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        cls.addClassCleanup(scratch.cleanup)
-        cls.measurement = jack.LatencyMeasurement(scratch.name, period_frames=cls.period_frames)
+        folder = cls.enterClassContext(tempfile.TemporaryDirectory(prefix="carillon-"))
+        cls.measurement = jack.LatencyMeasurement(folder, period_frames=cls.period_frames)
         cls.addClassCleanup(cls.measurement.stop)
 
-    def period_ms(self):
-        return 1000 * self.period_frames / jack.RATE
+        cls.period_ms = 1000 * cls.period_frames / jack.RATE
 
     def measure(self, way):
         for _ in range(ATTEMPTS):
@@ -39,7 +37,7 @@ class LatencyTest(unittest.TestCase):
             missed, xruns = found["missed_cycles"], found["xruns"]
             # A strike that is heard later than the next is due passes for the next.
             behind_ms = found["most_ms"] - found["stated_ms"]
-            if (missed + xruns == 0 and found["clock_error_ms"] <= self.period_ms()
+            if (missed + xruns == 0 and found["clock_error_ms"] <= self.period_ms
                     and behind_ms < found["shortest_gap_ms"]):
                 return found
         self.skipTest(f"too busy for sound here: {missed} cycles of JACK missed, {xruns} xruns of the daemon, "
@@ -56,7 +54,7 @@ class LatencyTest(unittest.TestCase):
         # arrive, rounded up to a block.
         self.assertGreaterEqual(found["least_ms"], found["delay_ms"])
         # JACK's own cycles may come late by two before it counts one as missed.
-        self.assertLessEqual(found["most_over_ms"], 3 * self.period_ms())
+        self.assertLessEqual(found["most_over_ms"], 3 * self.period_ms)
 
     def test_a_strike_of_now_sounds_when_the_daemon_states(self):
         self.assert_as_stated(self.measure("stream"))
@@ -71,7 +69,3 @@ class LatencyTest(unittest.TestCase):
 class LongPeriodLatencyTest(LatencyTest):
     # JACK asks for four blocks at a time.
     period_frames = 4 * jack.PERIOD_FRAMES
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -7,66 +7,37 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
-import time
 import unittest
 
-from carillon.v1 import audio_service_pb2, scene_service_pb2
-from daemon import BIN, Daemon
+import carillon
+from daemon import Daemon, ScratchTest, wait_until
 
 JOURNAL = "/run/systemd/journal"
-# Only a daemon that never logs takes this long.
-DEADLINE_S = 30.0
 
 
-def wait_until(test):
-    end_s = time.monotonic() + DEADLINE_S
-    while not test():
-        if time.monotonic() > end_s:
-            raise AssertionError("it did not happen")
-        time.sleep(0.02)
-
-
-class LevelTest(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-        self.configuration = self.folder / "carillond.toml"
-
-    def serve(self, level):
-        self.configuration.write_text(f'log_level = "{level}"\n')
-        self.daemon = Daemon(self.folder, "--config", self.configuration)
-        self.addCleanup(self.daemon.stop)
-
-    def log(self):
-        return (self.folder / "log").read_text()
-
-    def create_scene(self):
-        return self.daemon.client().scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-
-    def change_gain(self, gain):
-        self.daemon.client().audio.UpdateMixer(audio_service_pb2.UpdateMixerRequest(gain=gain))
+class LevelTest(ScratchTest):
+    def reload(self, level, told):
+        (self.folder / "carillond.toml").write_text(f'log_level = "{level}"\n')
+        self.daemon.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: told in self.daemon.log())
 
     def test_a_reload_changes_the_level_in_both_directions(self):
-        self.serve("info")
-        quiet = self.create_scene()
-        self.change_gain(0.5)
-        self.assertIn(" info: mixer_changed gain=0.5 muted=false caller=local peer=unix:pid-", self.log())
-        self.configuration.write_text('log_level = "debug"\n')
-        self.daemon.process.send_signal(signal.SIGHUP)
-        wait_until(lambda: "were read again" in self.log())
-        self.assertNotIn("need a restart", self.log())
-        self.assertIn("were read again; the log level is debug", self.log())
-        told = self.create_scene()
-        self.assertIn(f" debug: scene_created scene={told} ", self.log())
-        self.assertNotIn(f"scene_created scene={quiet} ", self.log())
-        self.configuration.write_text('log_level = "loud"\n')
-        self.daemon.process.send_signal(signal.SIGHUP)
-        wait_until(lambda: "nothing was changed by the reload" in self.log())
-        self.assertRegex(self.log(), "INVALID_CONFIGURATION: .*log_level")
-        self.change_gain(0.25)
-        self.assertIn("mixer_changed gain=0.25", self.log())
+        configuration = self.folder / "carillond.toml"
+        configuration.write_text('log_level = "info"\n')
+        self.serve("--config", configuration)
+        c = self.enterContext(carillon.connect(self.daemon.server))
+        quiet = c.scene().name
+        c.set_volume(gain=0.5)
+        self.assertIn(" info: mixer_changed gain=0.5 muted=false caller=local peer=unix:pid-", self.daemon.log())
+        self.reload("debug", "were read again; the log level is debug")
+        self.assertNotIn("need a restart", self.daemon.log())
+        told = c.scene().name
+        self.assertIn(f" debug: scene_created scene={told} ", self.daemon.log())
+        self.assertNotIn(f"scene_created scene={quiet} ", self.daemon.log())
+        self.reload("loud", "nothing was changed by the reload")
+        self.assertRegex(self.daemon.log(), "INVALID_CONFIGURATION: .*log_level")
+        c.set_volume(gain=0.25)
+        self.assertIn("mixer_changed gain=0.25", self.daemon.log())
 
 
 def namespaces_permitted():
@@ -84,18 +55,12 @@ def within_namespace(folder):
     os.makedirs(JOURNAL)
     journal = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     journal.bind(f"{JOURNAL}/socket")
-    # A file in place of the stream that systemd would give.
-    stderr = open(folder / "stderr", "wb")  # pylint: disable=consider-using-with
-    status = os.fstat(stderr.fileno())
-    environment = dict(os.environ, JOURNAL_STREAM=f"{status.st_dev}:{status.st_ino}")
-    process = subprocess.Popen(
-        [BIN / "carillond", "--data-dir", folder / "data", "--listen", f"unix:{folder}/socket", "--audio-device",
-         "null", "--no-transfers"], stdout=subprocess.PIPE, stderr=stderr, env=environment)
-    process.stdout.readline()
-    subprocess.run([BIN / "carillon", "--server", f"unix:{folder}/socket", "volume", "--gain", "0.5"], check=True,
-                   capture_output=True)
-    process.terminate()
-    process.wait()
+    # The log, a file, stands for the stream that systemd would give.
+    (folder / "log").touch()
+    status = (folder / "log").stat()
+    daemon = Daemon(folder, environment=dict(os.environ, JOURNAL_STREAM=f"{status.st_dev}:{status.st_ino}"))
+    daemon.command("volume", "--gain", "0.5")
+    daemon.stop()
     journal.setblocking(False)
     messages = []
     while True:
@@ -106,16 +71,14 @@ def within_namespace(folder):
     (folder / "messages").write_bytes(b"\0".join(messages))
 
 
-class JournalTest(unittest.TestCase):
+class JournalTest(ScratchTest):
     @unittest.skipUnless(namespaces_permitted(), "mount namespaces are not permitted here")
     def test_the_journal_gets_levels_and_the_fields_of_events(self):
-        with tempfile.TemporaryDirectory(prefix="carillon-") as scratch:
-            folder = pathlib.Path(scratch)
-            subprocess.run(["unshare", "--mount", "--map-root-user", sys.executable, __file__, "journal", folder],
-                           check=True, timeout=DEADLINE_S)
-            messages = [dict(line.split("=", 1) for line in message.decode().splitlines())
-                        for message in (folder / "messages").read_bytes().split(b"\0")]
-            self.assertEqual((folder / "stderr").read_bytes(), b"")
+        subprocess.run(["unshare", "--mount", "--map-root-user", sys.executable, __file__, self.folder], check=True,
+                       timeout=30)
+        messages = [dict(line.split("=", 1) for line in message.decode().splitlines())
+                    for message in (self.folder / "messages").read_bytes().split(b"\0")]
+        self.assertEqual((self.folder / "log").read_bytes(), b"")
         changed = next(message for message in messages if message.get("CARILLON_EVENT") == "mixer_changed")
         self.assertEqual(changed["PRIORITY"], "6")
         self.assertEqual(changed["SYSLOG_IDENTIFIER"], "carillond")
@@ -129,7 +92,4 @@ class JournalTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["journal"]:
-        within_namespace(pathlib.Path(sys.argv[2]))
-    else:
-        unittest.main()
+    within_namespace(pathlib.Path(sys.argv[1]))

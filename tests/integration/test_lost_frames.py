@@ -6,35 +6,28 @@ import os
 import pathlib
 import signal
 import subprocess
-import tempfile
 import time
-import unittest
 
 import jack
 from carillon.v1 import audio_service_pb2
-from daemon import Daemon
+from daemon import ScratchTest, wait_until
 
 PERIOD_FRAMES = 512  # four of the daemon's blocks
 STOPS_S = (0.03, 0.06)
 
 
-class LostFramesTest(unittest.TestCase):
+class LostFramesTest(ScratchTest):
     def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-        self.jack = jack.Jack(PERIOD_FRAMES, self.folder / "jackd")
-        self.addCleanup(self.jack.stop)
-        self.daemon = Daemon(self.folder, "--audio-device", jack.DEVICE, environment=self.jack.environment)
-        self.addCleanup(self.daemon.stop)
-        self.client = self.daemon.client()
+        super().setUp()
+        self.addCleanup(jack.Jack(PERIOD_FRAMES, self.folder / "jackd").stop)
+        self.serve("--audio-device", jack.DEVICE, environment=jack.ENVIRONMENT)
 
     def mixer(self):
         return self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest())
 
     def record(self):
         recorder = subprocess.Popen(
-            [jack.PROGRAMS / "record_jack", jack.PORT, "60", self.folder / "capture"], env=self.jack.environment,
+            [jack.PROGRAMS / "record_jack", jack.PORT, "60", self.folder / "capture"], env=jack.ENVIRONMENT,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.assertEqual(recorder.stdout.readline(), "recording\n")
         return recorder
@@ -47,8 +40,7 @@ class LostFramesTest(unittest.TestCase):
     def let_pass(self, seconds):
         """Of the sound."""
         end = self.mixer().frame_count + seconds * jack.RATE
-        while self.mixer().frame_count < end:
-            time.sleep(0.02)
+        wait_until(lambda: self.mixer().frame_count >= end)
 
     def test_frames_lost_are_those_a_capture_misses(self):
         recorder = self.record()
@@ -74,7 +66,3 @@ class LostFramesTest(unittest.TestCase):
         self.assertEqual(lost % PERIOD_FRAMES, 0)
         self.assertLessEqual(lost, captured["missed_frames"])
         self.assertGreaterEqual(lost, captured["missed_frames"] - len(STOPS_S) * PERIOD_FRAMES)
-
-
-if __name__ == "__main__":
-    unittest.main()

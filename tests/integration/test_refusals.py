@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each bad mesh gets its own reason and a way to repair it, and the daemon goes on playing."""
 
-import subprocess
-import unittest
-
 import grpc
 
 import meshes
+import sound
 import strike
-from carillon.v1 import contact_pb2, error_pb2, material_pb2
-from carillon.v1 import modal_model_service_pb2, scene_service_pb2
-from daemon import BIN, DaemonTest
+from carillon.v1 import modal_model_service_pb2
+from daemon import DaemonTest
 
-MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 BOX = meshes.box((0.10, 0.03, 0.02))
 MESH_LIMIT_BYTES = 256 << 20
 
@@ -46,45 +42,19 @@ class RefusalTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        model = cls.client.wait(cls.client.create(meshes.bar(), "obj", material=MATERIAL))
-        cls.scene = cls.client.scenes.CreateScene(scene_service_pb2.CreateSceneRequest()).name
-        cls.handle = cls.client.scenes.AddObjects(scene_service_pb2.AddObjectsRequest(
-            scene=cls.scene,
-            objects=[scene_service_pb2.NewObject(modal_model=model, material=MATERIAL)])).objects[0].handle
+        cls.scene, cls.bar = cls.client.scene(cls.client.model())
 
     def setUp(self):
         self.addCleanup(self.assert_plays)
 
     def assert_plays(self):
-        impulse = contact_pb2.Contact(
-            kind=contact_pb2.CONTACT_KIND_IMPACT, object=self.handle, point_m=contact_pb2.Vec3(z=meshes.BAR_SIZE[2]),
-            impulse_newton_seconds=contact_pb2.Vec3(z=-0.001))
+        impulse = sound.impulse((0, 0, meshes.BAR_SIZE[2]), (0, 0, -0.001), self.bar.handle, duration_s=None)
         heard = self.client.listen(0.2, on_start=lambda: self.client.strike(self.scene, [impulse]))
         self.assertGreater(max(map(abs, heard.samples)), 1e-5)
 
     def assert_repairs(self, message):
         """A sentence of what was wrong and, after a colon or semicolon, what to do."""
         self.assertRegex(message, r"^.{8,}[:;] .{8,}")
-
-    def refusal(self, call):
-        """The ErrorInfo that a call or the job that it waits for ends with."""
-        try:
-            call()
-        except strike.Refused as refused:
-            return refused.info
-        except grpc.RpcError as error:
-            return strike.refusal(error).info
-        return error_pb2.ErrorInfo()
-
-    def test_over_grpc(self):
-        for reason, data in BAD_MESHES.items():
-            with self.subTest(reason):
-                info = self.refusal(lambda data=data: self.client.wait(
-                    self.client.create(data, "obj", material=MATERIAL)))
-                self.assertEqual(info.reason, reason)
-                self.assertEqual([remedy.option for remedy in info.remedies], REMEDIES.get(reason, []))
-                self.assert_repairs(info.message)
-                self.assert_plays()
 
     def test_on_the_command_line(self):
         path = self.folder / "bad.obj"
@@ -104,31 +74,13 @@ class RefusalTest(DaemonTest):
     def test_file_over_the_limit(self):
         piece = modal_model_service_pb2.UploadMeshRequest(data=bytes(strike.PIECE_BYTES))
         pieces = (piece for _ in range(MESH_LIMIT_BYTES // strike.PIECE_BYTES + 1))
-        info = self.refusal(lambda: self.client.models.UploadMesh(pieces))
+        with self.assertRaises(grpc.RpcError) as refused:
+            self.client.models.UploadMesh(pieces)
+        info = strike.refusal(refused.exception).info
         self.assertEqual(info.reason, "MESH_TOO_LARGE")
         self.assert_repairs(info.message)
         self.assert_plays()
         path = self.folder / "large.stl"
         with open(path, "wb") as large:
             large.truncate(MESH_LIMIT_BYTES + 1)
-        ended = self.daemon.command("model", "create", path, "--material", meshes.MATERIAL,
-                                    check=False)
-        self.assertEqual(ended.returncode, 1)
-        self.assertIn("carillon: MESH_TOO_LARGE: ", ended.stderr)
-
-class CommandLineTest(DaemonTest):
-    def command(self, *arguments):
-        return self.daemon.command(*arguments, check=False)
-
-    def test_exit_status_tells_refused_from_called_wrongly_from_no_daemon(self):
-        self.assertEqual(self.command("status").returncode, 0)
-        self.assertEqual(self.command("model", "show", "nothing").returncode, 1)
-        self.assertEqual(self.command("model").returncode, 2)
-        nowhere = subprocess.run([BIN / "carillon", "--server", f"unix:{self.folder}/none", "status"],
-                                 capture_output=True, text=True, check=False)
-        self.assertEqual(nowhere.returncode, 3)
-        self.assertTrue(nowhere.stderr.startswith("carillon: SERVER_UNAVAILABLE: "), nowhere.stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()
+        self.assertEqual(self.daemon.refusal("model", "create", path, "--material", meshes.MATERIAL), "MESH_TOO_LARGE")

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contacts as Bullet and ODE report them, a resting load in every step, do not drone; a slide and a roll
-are heard."""
+"""Contacts as engines report them: a resting load in every step does not drone, a slide and a roll are heard, one
+collision sounds alike from five engines, and a contact beneath a corner sounds as one at the corner."""
 
 import json
+import statistics
 import sys
-import unittest
 
 import numpy
 
 import carillon
 import meshes
 import sound
-from carillon.v1 import contact_pb2, contact_trace_pb2, material_pb2, modal_model_pb2
 from daemon import ROOT, DaemonTest
 
 sys.path.insert(0, str(ROOT / "client_sdk/examples/falls"))
 import falls  # noqa: E402
+import video  # noqa: E402
 
 MATERIAL = "oak"
 BOX_M = (0.20, 0.14, 0.03)  # its origin in the middle
@@ -33,10 +33,6 @@ def box_on_floor(model, drop_m, friction, velocity_m_per_s=(0, 0, 0)):
                                "model": model, "material": MATERIAL}]}
 
 
-def centred_box():
-    return meshes.obj(*meshes.box(BOX_M, low=[-side / 2 for side in BOX_M]))
-
-
 def decibels(ratio):
     return 20 * numpy.log10(ratio + 1e-30)
 
@@ -49,20 +45,10 @@ class RestTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.model = cls.decompose(centred_box(), MATERIAL)
-
-    @classmethod
-    def decompose(cls, mesh, material):
-        return cls.client.wait(cls.client.create(
-            mesh, "obj", settings=modal_model_pb2.DecompositionSettings(),
-            material=material_pb2.Material(preset=material)))
+        cls.model = cls.c.create_model(meshes.centred_box(BOX_M), MATERIAL).name
 
     def render(self, trace):
-        out = self.folder / "sound.wav"
-        printed = self.daemon.command("--json", "render", trace, "--out", out, "--sample-rate",
-                                      sound.RATE, "--tail", 1)
-        self.assertEqual(int(json.loads(printed.stdout).get("rejected_count", 0)), 0)
-        return sound.read_wave(out)[:, 0]
+        return self.c.render(trace, sample_rate_hz=sound.RATE, tail_s=1).samples[:, 0]
 
     def simulate(self, engine, scene, rate_hz, seconds):
         trace = self.folder / "floor.contacts"
@@ -81,17 +67,11 @@ class RestTest(DaemonTest):
 
     def constant_load(self, rate_hz):
         """A blow, and then the weight of 2 kg from two seconds on."""
-        steps = [contact_pb2.ContactStep(time_s=0, contacts=[
-            sound.impulse((0.03, 0.02, -0.015), (0, 0, 2), duration_s=0.0005)])]
-        place = contact_pb2.Vec3(x=0.03, y=0.02, z=-0.015)
+        trace = carillon.Trace(step=1 / rate_hz)
+        box, place = trace.add(self.model, MATERIAL), (0.03, 0.02, -0.015)
+        trace.step(0, impacts=carillon.Impacts(box, [place], [(0, 0, 2)], durations=0.0005))
         for step in range(2 * rate_hz, 5 * rate_hz):
-            force = contact_pb2.Contact(kind=contact_pb2.CONTACT_KIND_FORCE, object=1, point_m=place,
-                                        force_newtons=contact_pb2.Vec3(z=19.62))
-            steps.append(contact_pb2.ContactStep(time_s=step / rate_hz, contacts=[force]))
-        trace = self.folder / "load.contacts"
-        body = contact_trace_pb2.ContactTraceObject(
-            handle=1, modal_model=self.model, material=material_pb2.Material(preset=MATERIAL))
-        sound.write_trace(trace, [body], steps, step_s=1 / rate_hz)
+            trace.step(step / rate_hz, forces=carillon.ContactForces(box, [place], [(0, 0, 19.62)]))
         return self.render(trace)
 
     def test_a_constant_load_is_silent(self):
@@ -120,19 +100,60 @@ class RestTest(DaemonTest):
                 self.assertLess(decibels(rests / slides), -40)
 
     def test_a_rolling_ball_is_heard_without_lines_at_the_step_rate(self):
-        with carillon.connect(self.daemon.server) as client:
-            scene = falls.create_models(client, json.loads((falls.SCENES / "roll.json").read_text()))
+        scene = falls.create_models(self.c, json.loads((falls.SCENES / "roll.json").read_text()))
         for engine in ("bullet", "ode"):
             with self.subTest(engine=engine):
                 rolls = self.between(self.simulate(engine, scene, 240, 1.4), 0.3, 1.3)
                 self.assertGreater(rms(rolls), 1e-5)
-                self.assert_no_lines(rolls, 240)
-
-    def assert_no_lines(self, samples, rate_hz):
-        excess = sound.lines_db(samples, rate_hz)
-        print(f"lines at the step rate: {excess:.1f} dB over what is beside them", flush=True)
-        self.assertLess(excess, 3)
+                excess = sound.lines_db(rolls, 240)
+                print(f"lines at the step rate: {excess:.1f} dB over what is beside them", flush=True)
+                self.assertLess(excess, 3)
 
 
-if __name__ == "__main__":
-    unittest.main()
+class FallsTest(DaemonTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        scene = json.loads((falls.SCENES / "collision.json").read_text())
+        cls.scene = falls.create_models(cls.c, scene)
+
+    def test_the_same_collision_is_as_loud_from_every_engine(self):
+        levels = {}
+        for engine in falls.ENGINES:
+            trace = self.folder / f"{engine}.contacts"
+            falls.record(engine, self.scene, trace, rate=1000, seconds=0.3)
+            sound = self.render(trace)
+            self.assertEqual(sound.summary.limited_frame_count, 0)
+            self.assertGreater(sound.summary.findings.blow_count, 0)
+            levels[engine] = 10 * numpy.log10(numpy.sum(numpy.square(sound.mono)))
+        median = statistics.median(levels.values())
+        print({engine: round(level - median, 1) for engine, level in levels.items()}, flush=True)
+        for engine, level in levels.items():
+            self.assertLess(abs(level - median), 3, engine)
+
+    def test_a_video_shows_the_bodies_where_the_simulation_has_them(self):
+        trace = self.folder / "seen.contacts"
+        falls.record("bullet", self.scene, trace, rate=1000, seconds=0.3)
+        frames = video.frames_of(self.scene, carillon.Trace.read(trace).steps)
+        self.assertAlmostEqual(len(frames), 0.3 * video.FRAMES_PER_S, delta=1)
+        ways = [numpy.linalg.norm(numpy.subtract(last[0], first[0])) for first, last in zip(frames[0], frames[-1])]
+        self.assertGreater(max(ways), 0.01)
+
+    def render(self, path):
+        """Softly, so that nothing is limited."""
+        trace = carillon.Trace.read(path)
+        for body in trace.objects:
+            body.gain = 0.001
+        return self.c.render(trace, sample_rate_hz=48000, tail_s=0.3)
+
+    def strike(self, at):
+        """A contact of a cube's corner, as an engine reports it at a place on the way to its middle."""
+        trace = carillon.Trace(step=1 / 240)
+        cube = trace.add(self.scene["bodies"][0]["model"], "concrete", gain=0.001)
+        for step in range(20):
+            contacts = carillon.Contacts(cube, [(at, at, at)], [(-0.3, -0.3, -0.3)]) if step == 2 else None
+            trace.step(step / 240, contacts=contacts)
+        return self.c.render(trace, sample_rate_hz=48000, tail_s=0.3)
+
+    def test_a_contact_beneath_a_corner_sounds_as_one_at_the_corner(self):
+        numpy.testing.assert_array_equal(self.strike(0.096).samples, self.strike(0.1).samples)

@@ -10,7 +10,6 @@ import pathlib
 import random
 import shutil
 import signal
-import sqlite3
 import subprocess
 import tempfile
 import threading
@@ -20,33 +19,29 @@ import unittest
 import meshes
 import scripted
 import strike
-from carillon.v1 import decomposition_pb2, decomposition_service_pb2, material_pb2, modal_model_pb2
-from daemon import ROOT, Daemon
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2, modal_model_pb2
+from daemon import MATERIAL, ROOT, ScratchTest
 
 BODY_COUNT = int(os.environ.get("CARILLON_SLURM_BODIES", "4"))
 SEED = int(os.environ.get("CARILLON_SEED", "0")) or random.SystemRandom().getrandbits(32)
-MATERIAL = material_pb2.Material(preset=meshes.MATERIAL)
 # The controller is killed so often, up to so long after a submit.
 BATCH_COUNT, LATEST_KILL_S = (10, 10) if BODY_COUNT >= 40 else (2, 2)
 SCRIPT = ROOT / "deploy/slurm/one_machine.sh"
 
 
 class Cluster:
-    def __init__(self, folder, nodes=1):
+    def __init__(self, folder):
         self.folder = folder
-        self.nodes = nodes
         self.over = threading.Event()
         os.environ["SLURM_CONF"] = str(folder / "slurm.conf")
 
-    def run(self, *action):
-        action, *more = map(str, action)
-        return subprocess.run([SCRIPT, action, self.folder, *more], capture_output=True, text=True,
-                              check=False, timeout=120)
+    def run(self, action, *more):
+        return subprocess.run([SCRIPT, action, self.folder, *more], capture_output=True, check=False, timeout=120)
 
     def start(self):
         """Whether it works: a job that does nothing comes to its end."""
         try:
-            if self.run("start", self.nodes).returncode != 0:
+            if self.run("start", "1").returncode != 0:
                 return False
             return subprocess.run(["srun", "--mem=10M", "true"], capture_output=True, timeout=60,
                                   check=False).returncode == 0
@@ -57,17 +52,18 @@ class Cluster:
         """What an administrator does: a node is drained where a controller that forgot a job gave its number to
         another, and the first still ran there."""
         while not self.over.wait(1):
-            self.call("sinfo", "--noheader", "--format=%n %T", then=lambda node, state: "drain" in state and self.call(
-                "scontrol", "update", f"nodename={node}", "state=resume"))
+            for line in self.call("sinfo", "--noheader", "--format=%n %T"):
+                node, state = line.split()
+                if "drain" in state:
+                    self.call("scontrol", "update", f"nodename={node}", "state=resume")
 
     @staticmethod
-    def call(*command, then=None):
+    def call(*command):
+        """The lines that a command prints, none if the controller is down."""
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=False)
+            return subprocess.run(command, capture_output=True, text=True, timeout=20).stdout.splitlines()
         except subprocess.TimeoutExpired:
-            return  # the controller is down
-        for line in done.stdout.splitlines() if then else []:
-            then(*line.split())
+            return []
 
     def kill(self, program):
         """kill -9, and the program starts again."""
@@ -80,15 +76,14 @@ class Cluster:
             pass
 
 
-class SlurmTest(unittest.TestCase):
+class SlurmTest(ScratchTest):
     @classmethod
     def setUpClass(cls):
         for program in ("slurmctld", "slurmd", "munged"):
             if shutil.which(program, path="/usr/sbin:/usr/bin") is None:
                 raise AssertionError(f"{program} is not installed: deploy/setup.sh tests")
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-slurm-")
-        cls.addClassCleanup(scratch.cleanup)
-        cls.cluster = Cluster(pathlib.Path(scratch.name))
+        scratch = cls.enterClassContext(tempfile.TemporaryDirectory(prefix="carillon-slurm-"))
+        cls.cluster = Cluster(pathlib.Path(scratch))
         cls.addClassCleanup(cls.cluster.run, "stop")
         if not cls.cluster.start():
             raise unittest.SkipTest("no Slurm cluster can be started here")
@@ -100,36 +95,18 @@ class SlurmTest(unittest.TestCase):
     def setUp(self):
         # A controller that was killed may take jobs that have ended to run for ever.
         subprocess.run(["scancel", "--user", "root"], capture_output=True, timeout=60, check=False)
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
+        super().setUp()
         self.rng = random.Random(SEED)
 
     def start_daemon(self, *arguments):
-        self.daemon = Daemon(self.folder, "--slurm-dir", self.folder / "data/slurm", *arguments)
-        self.addCleanup(lambda: self.daemon.stop())
+        self.serve("--slurm-dir", self.folder / "data/slurm", *arguments)
 
-    def create(self, client, number, **settings):
+    def create(self, client, number):
         # Real bodies, each another: the number of nodes makes the name, and some 0.3 s of work.
         return client.create(
-            meshes.bar(), "obj", material=MATERIAL, **settings,
+            meshes.bar(), "obj", material=MATERIAL,
             settings=modal_model_pb2.DecompositionSettings(
                 mesh=modal_model_pb2.MeshSettings(target_node_count=200 + number)))
-
-    def wait(self, job):
-        client = self.daemon.client()
-        return client.wait(client.jobs.GetJob(
-            decomposition_service_pb2.GetJobRequest(name=job.name)).job)
-
-    def stored(self):
-        """(models, revisions ever stored, jobs that did not succeed) in the database."""
-        database = sqlite3.connect(self.folder / "data/carillon.db")
-        count, = database.execute("SELECT count(*) FROM models").fetchone()
-        last, = database.execute("SELECT seq FROM sqlite_sequence WHERE name = 'models'").fetchone()
-        failed, = database.execute("SELECT count(*) FROM jobs WHERE state != ?",
-                                   (decomposition_pb2.JOB_STATE_SUCCEEDED,)).fetchone()
-        database.close()
-        return count, last, failed
 
     def test_every_model_is_there_once_though_daemons_of_the_cluster_and_ours_are_killed(self):
         self.start_daemon()
@@ -144,10 +121,11 @@ class SlurmTest(unittest.TestCase):
             if i in (BATCH_COUNT // 2, BATCH_COUNT - 1):
                 self.daemon.kill()
                 self.daemon.start()
+        client = self.daemon.client()
         for job in jobs:
-            self.wait(job)
+            client.wait(job)
         self.assertEqual(self.daemon.stop(), 0)
-        self.assertEqual(self.stored(), (BODY_COUNT, BODY_COUNT, 0))
+        self.assertEqual(scripted.stored(self.folder), (BODY_COUNT, BODY_COUNT, 0))
         print(f"\nseed {SEED}: {BODY_COUNT} bodies, slurmctld killed {BATCH_COUNT} times, slurmd once, the daemon "
               f"twice: {BODY_COUNT} models stored once each")
 
@@ -159,7 +137,7 @@ case $((nodes % 10)) in
   *) sleep 1000 ;;
 esac"""
         self.start_daemon("--precompute", scripted.worker(self.folder, body), "--job-memory-mib", 100)
-        client = self.daemon.client()
+        client = self.client
         for number, reason in ((1, "WORKER_CRASHED"), (2, "OUT_OF_MEMORY")):
             with self.assertRaises(strike.Refused) as refused:
                 client.wait(self.create(client, number))
@@ -168,7 +146,3 @@ esac"""
         client.jobs.CancelJob(decomposition_service_pb2.CancelJobRequest(name=endless.name))
         *_, last = client.jobs.WatchJob(decomposition_service_pb2.WatchJobRequest(name=endless.name))
         self.assertEqual(last.job.state, decomposition_pb2.JOB_STATE_CANCELLED)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,8 +2,6 @@
 """A body that slides, and whose contact an engine reports unevenly, has no lines at the multiples of the step rate, and
 its load does not click."""
 
-import unittest
-
 import numpy
 
 import carillon
@@ -58,11 +56,9 @@ class StepRateTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.carillon = carillon.connect(cls.daemon.server)
-        cls.addClassCleanup(cls.carillon.close)
         cls.box, cls.board = (
-            cls.carillon.create_model(meshes.box(sides, low=[-side / 2 for side in sides]), MATERIAL,
-                                      max_frequency_hz=highest) for sides, highest in ((BOX_M, 0), (BOARD_M, 4000)))
+            cls.c.create_model(meshes.centred_box(sides), MATERIAL, max_frequency_hz=highest)
+            for sides, highest in ((BOX_M, 0), (BOARD_M, 4000)))
 
     def slide(self, forces, rate_hz, depth, *, model=None):
         """The sound of a body, the box unless named, with these forces (N, on each corner of the box) in each step."""
@@ -74,7 +70,7 @@ class StepRateTest(DaemonTest):
             contacts = carillon.Contacts(box, [CORNERS[i] for i in touching], impulses, partners=1,
                                          travel_speeds=SPEED_M_PER_S, roughness_depth=depth)
             trace.step(step / rate_hz, contacts=contacts if len(touching) else None)
-        return self.carillon.render(trace, sample_rate_hz=sound.RATE, tail_s=0.1)
+        return self.c.render(trace, sample_rate_hz=sound.RATE, tail_s=0.1)
 
     def assert_no_lines(self, make_forces, depth, struck=True):
         for rate_hz in RATES_HZ:
@@ -113,7 +109,3 @@ class StepRateTest(DaemonTest):
                 level = 20 * numpy.log10(clicks / numpy.abs(numpy.diff(heard, 2)).max() + 1e-30)
                 print(f"{self.id().rsplit('.')[-1]}, {rate_hz} Hz: {level:.0f} dB of the impact", flush=True)
                 self.assertLess(level, CLICKS_DB)
-
-
-if __name__ == "__main__":
-    unittest.main()

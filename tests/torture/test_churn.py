@@ -4,7 +4,6 @@
 import collections
 import os
 import pathlib
-import re
 import resource
 import signal
 import statistics
@@ -12,12 +11,9 @@ import subprocess
 import sys
 import threading
 import time
-import unittest
-import urllib.request
 
-import meshes
 import torture
-from carillon.v1 import material_pb2
+from daemon import free_port, wait_until
 
 CLIENTS = 20
 RUN_S = 60 * float(os.environ.get("CARILLON_TORTURE_MINUTES") or torture.rounds(0.25, 10))
@@ -89,13 +85,10 @@ class ChurnTest(torture.ServedTest):
         return Sample(time.monotonic(), resident, shared,
                       len(os.listdir(process / "fd")), len(os.listdir(process / "task")))
 
-    def metrics(self):
-        with urllib.request.urlopen(f"http://{self.daemon.arguments[-1]}/metrics", timeout=10) as answer:
-            return dict(re.findall(r"^(carillon_[a-z_]+(?:\{[^}]*\})?) (\S+)$", answer.read().decode(), re.MULTILINE))
-
     def taken_places(self):
         wanted = ("carillon_scenes", "carillon_objects", "carillon_calls{", "carillon_jobs{")
-        return {name: value for name, value in self.metrics().items() if name.startswith(wanted) and value != "0"}
+        return {name: value for name, value in self.daemon.metrics().items()
+                if name.startswith(wanted) and value != "0"}
 
     def churn(self, model):
         """Runs the clients for one part and reads the metrics meanwhile; returns the samples of each second."""
@@ -107,7 +100,7 @@ class ChurnTest(torture.ServedTest):
                 time.sleep(min(1.0, RUN_S / 20))
                 samples.append(self.sample())
                 if len(samples) % SAMPLES_PER_SCRAPE == 0:
-                    self.metrics()
+                    self.daemon.metrics()
         finally:
             churn.stop()
         self.lives += churn.lives
@@ -117,12 +110,12 @@ class ChurnTest(torture.ServedTest):
 
     def rest(self):
         """Returns a sample when no call is left, no place is taken, and freed memory has been given back."""
-        torture.wait_until(lambda: not self.taken_places(), 60)
+        wait_until(lambda: not self.taken_places(), 60)
         time.sleep(REST_S)
         return self.sample()
 
     def allocated_mib(self):
-        return float(self.metrics()["carillon_heap_bytes"]) / 2**20
+        return float(self.daemon.metrics()["carillon_heap_bytes"]) / 2**20
 
     def check_memory(self, before, rests):
         growth_mib_per_hour = slope_per_hour(rests[len(rests) // 2:])
@@ -145,9 +138,8 @@ class ChurnTest(torture.ServedTest):
             self.assertLess(getattr(after, name), getattr(before, name) + 2 * CLIENTS)
 
     def test_nothing_grows_and_no_place_is_used_up(self):
-        self.serve("--scene-grace", "1", "--metrics", f"127.0.0.1:{torture.free_port()}")
-        model = self.client.wait(self.client.create(
-            meshes.bar(), "obj", material=material_pb2.Material(preset=meshes.MATERIAL)))
+        self.serve("--scene-grace", "1", "--metrics", f"127.0.0.1:{free_port()}")
+        model = self.client.model()
         self.lives = self.deaths = 0
         before = self.sample()
         parts = []
@@ -162,7 +154,3 @@ class ChurnTest(torture.ServedTest):
         self.check_counts(before, parts, rests[-1])
         self.check_memory(before, rests)
         self.assertGreater(self.lives, CLIENTS)
-
-
-if __name__ == "__main__":
-    unittest.main()

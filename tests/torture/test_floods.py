@@ -12,15 +12,13 @@ import statistics
 import struct
 import threading
 import time
-import unittest
 
 import grpc
+import hpack
 
 import torture
 from carillon.v1 import audio_service_pb2
-from http2_frames import (
-    CALL, CANCEL, CONTINUATION, DATA, END_HEADERS, HEADERS, METHOD, PING, PREFACE, RST_STREAM, SETTINGS, Windows, field,
-    frame)
+from daemon import resident_mib, wait_until
 
 CONNECTIONS = 4
 RUN_S = torture.rounds(2.0, 20.0)
@@ -34,6 +32,70 @@ REST_S = 60
 
 MOST_STREAM_ID = 2**31 - 1
 FRAMES_AT_ONCE = 200
+
+# Frames of HTTP/2 (RFC 9113), byte by byte, for clients that no library would be.
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+DATA, HEADERS, RST_STREAM, SETTINGS, PING, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 8, 9
+END_HEADERS, ACK = 4, 1
+INITIAL_WINDOW_SIZE = 4
+CANCEL = 8
+METHOD = b"/carillon.v1.AudioService/GetMixer"
+
+
+def frame(kind, flags=0, stream=0, payload=b""):
+    return len(payload).to_bytes(3, "big") + bytes((kind, flags)) + stream.to_bytes(4, "big") + payload
+
+
+def fields(*headers):
+    """Headers without compression, which are not remembered (RFC 7541, 6.2.3)."""
+    return hpack.Encoder().encode([hpack.NeverIndexedHeaderTuple(*header) for header in headers], huffman=False)
+
+
+# The headers of a call.
+CALL = fields((b":method", b"POST"), (b":scheme", b"http"), (b":path", METHOD), (b":authority", b"localhost"),
+              (b"te", b"trailers"), (b"content-type", b"application/grpc"))
+
+
+class Windows:
+    """How many bytes a connection (stream 0) and each of its streams may still send, as the server has said."""
+
+    def __init__(self, connection):
+        self.connection = connection
+        self.received = b""
+        self.initial = 65535
+        self.left = {0: 65535}
+
+    def open(self, stream):
+        self.left[stream] = self.initial
+
+    def read(self):
+        """Takes what has come. Returns false when the server has closed the connection."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                more = self.connection.recv(1 << 16, socket.MSG_DONTWAIT)
+                if not more:
+                    return False
+                self.received += more
+        while len(self.received) >= 9 + (size := int.from_bytes(self.received[:3], "big")):
+            kind, flags = self.received[3:5]
+            stream = int.from_bytes(self.received[5:9], "big")
+            self._take(kind, flags, stream, self.received[9:9 + size])
+            self.received = self.received[9 + size:]
+        return True
+
+    def _take(self, kind, flags, stream, payload):
+        if kind == WINDOW_UPDATE and stream in self.left:
+            self.left[stream] += int.from_bytes(payload, "big")
+        elif kind == PING and not flags & ACK:
+            self.connection.sendall(frame(PING, ACK, 0, payload))
+        elif kind == SETTINGS and not flags & ACK:
+            for name, value in struct.iter_unpack(">HI", payload):
+                if name == INITIAL_WINDOW_SIZE:
+                    self.left = {at: left + (value - self.initial if at else 0) for at, left in self.left.items()}
+                    self.initial = value
+            self.connection.sendall(frame(SETTINGS, ACK))
+        elif kind == RST_STREAM or (kind == HEADERS and flags & 1):
+            self.left.pop(stream, None)  # the server has ended the call
 
 
 def resets(stream):
@@ -101,20 +163,20 @@ class FloodTest(torture.ServedTest):
         call = channel.unary_unary(METHOD.decode(), audio_service_pb2.GetMixerRequest.SerializeToString,
                                    audio_service_pb2.GetMixerResponse.FromString)
         self.calls(call, 0.5)
-        before_mib = torture.resident_mib(self.daemon.process)
+        before_mib = resident_mib(self.daemon.process)
         flood = Flood(str(self.folder / "socket"), make, reads)
         try:
             amid, most_mib = self.calls(call, RUN_S)
         finally:
             flood.stop()
-        rest_s = torture.wait_until(lambda: torture.resident_mib(self.daemon.process) < before_mib + LEFT_MIB, REST_S)
+        rest_s = wait_until(lambda: resident_mib(self.daemon.process) < before_mib + LEFT_MIB, REST_S)
         p99_s = statistics.quantiles(amid, n=100)[98]
         print(f"{make.__name__}: {flood.frames} in {RUN_S:g} s; p99 of a good call {1e3 * p99_s:.1f} ms; "
               f"{before_mib:.1f} MiB before, at most {most_mib:.1f}, back after {rest_s:.0f} s", flush=True)
         self.assertGreater(flood.frames, 0)
         self.assertLess(p99_s, P99_S)
         self.assertLess(most_mib, before_mib + GROWTH_MIB)
-        return (self.folder / "log").read_text()
+        return self.daemon.log()
 
     def test_calls_that_are_cancelled_at_once(self):
         self.assertRegex(self.attack(resets),
@@ -139,31 +201,31 @@ class StrangerTest(torture.ServedTest):
         self.port = int(self.daemon.listening[-1].rpartition(":")[2])
         self.scene = torture.SoundingScene(self.daemon)
         self.addCleanup(self.scene.stop)
-        torture.wait_until(lambda: self.scene.answer.accepted_count > 0, 30)
+        wait_until(lambda: self.scene.answer.accepted_count > 0, 30)
 
     def attack(self, send, most_bytes, line):
         """`send(connection)` sends some bytes, and returns how many, until the daemon closes the connection, and logs
         the line. Returns the number of bytes."""
-        before_mib, most_mib, sent = torture.resident_mib(self.daemon.process), 0.0, 0
+        before_mib, most_mib, sent = resident_mib(self.daemon.process), 0.0, 0
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port)) as connection:
             # A timeout of Python's own would let each read wait for it.
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", 30, 0))
             connection.sendall(PREFACE + frame(SETTINGS))
             while sent < most_bytes:
                 sent += send(connection)
-                most_mib = max(most_mib, torture.resident_mib(self.daemon.process) - before_mib)
-        torture.wait_until(lambda: line in (self.folder / "log").read_text(), 10)
+                most_mib = max(most_mib, resident_mib(self.daemon.process) - before_mib)
+        wait_until(lambda: line in self.daemon.log(), 10)
         print(f"{sent >> 20} MiB sent, at most {most_mib:.0f} MiB more", flush=True)
         self.assertLess(most_mib, GROWTH_MIB)
         begun = self.scene.answer.accepted_count
-        torture.wait_until(lambda: self.scene.answer.accepted_count > begun, 30)
+        wait_until(lambda: self.scene.answer.accepted_count > begun, 30)
         self.assertTrue(all(thread.is_alive() for thread in self.scene.threads), "the simulator's stream was ended")
         self.assertEqual(self.scene.answer.dropped_count, 0)
         return sent
 
     def test_headers_without_an_end(self):
-        more = 16 * frame(CONTINUATION, 0, 1, field(b"x-more", bytes(7000)))
-        begin = [frame(HEADERS, 0, 1, field(b":method", b"POST"))]
+        more = 16 * frame(CONTINUATION, 0, 1, fields((b"x-more", bytes(7000))))
+        begin = [frame(HEADERS, 0, 1, fields((b":method", b"POST")))]
 
         def send(connection):
             part = begin.pop() if begin else more
@@ -248,18 +310,15 @@ def say_nothing(path, ended):
 class ConnectionTest(torture.ServedTest):
     """Another process that makes many connections."""
 
-    def attacked(self, attack, line, *arguments, prefix=()):
-        self.daemon = torture.Daemon(self.folder, *arguments, prefix=prefix)
-        self.addCleanup(self.daemon.kill)
-        self.client = self.daemon.client()
+    def attacked(self, attack, line, prefix=()):
+        self.serve(prefix=prefix)
         context = multiprocessing.get_context("spawn")
         ended = context.Event()
         attacker = context.Process(target=attack, args=(str(self.folder / "socket"), ended), daemon=True)
         attacker.start()
         self.addCleanup(attacker.join)
         self.addCleanup(ended.set)
-        log = self.folder / "log"
-        noticed_s = torture.wait_until(lambda: line in log.read_text(), 60)
+        noticed_s = wait_until(lambda: line in self.daemon.log(), 60)
         # The kernel may refuse a first connection, because the attacker's fill the queue.
         self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest(), timeout=60, wait_for_ready=True)
         times, most_mib = self.calls(self.client.audio.GetMixer, RUN_S)
@@ -277,13 +336,12 @@ class ConnectionTest(torture.ServedTest):
         self.attacked(say_nothing, "its share (--client-share)", prefix=("prlimit", "--nofile=1024:1024"))
 
     def test_a_call_without_a_place_is_told_why(self):
-        self.daemon = torture.Daemon(self.folder, prefix=("prlimit", "--nofile=512:512"))
-        self.addCleanup(self.daemon.kill)
+        self.serve(prefix=("prlimit", "--nofile=512:512"))
         with contextlib.ExitStack() as silent:
             for _ in range(64):  # half of the places, the share of this process
                 silent.enter_context(socket.socket(socket.AF_UNIX)).connect(str(self.folder / "socket"))
             with self.assertRaises(grpc.RpcError) as refused:
-                self.daemon.client().audio.GetMixer(audio_service_pb2.GetMixerRequest(), timeout=20)
+                self.client.audio.GetMixer(audio_service_pb2.GetMixerRequest(), timeout=20)
             self.assertEqual(refused.exception.code(), grpc.StatusCode.RESOURCE_EXHAUSTED)
             self.assertRegex(refused.exception.details(), r"^TOO_MANY_CONNECTIONS: .* its share \(--client-share\)")
 
@@ -291,8 +349,7 @@ class ConnectionTest(torture.ServedTest):
         soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
         resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096), hard))
         self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
-        self.daemon = torture.Daemon(self.folder, "--listen", "127.0.0.1:0", prefix=("prlimit", "--nofile=1024:1024"))
-        self.addCleanup(self.daemon.kill)
+        self.serve("--listen", "127.0.0.1:0", prefix=("prlimit", "--nofile=1024:1024"))
         port = int(self.daemon.listening[1].rpartition(":")[2])
         with contextlib.ExitStack() as silent:
             for _ in range(1100):
@@ -303,7 +360,3 @@ class ConnectionTest(torture.ServedTest):
         with grpc.insecure_channel(f"127.0.0.1:{port}") as channel:
             again = channel.unary_unary(METHOD.decode())
             again(b"", timeout=30, wait_for_ready=True)
-
-
-if __name__ == "__main__":
-    unittest.main()

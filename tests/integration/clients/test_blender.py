@@ -5,13 +5,13 @@ heard when and as it must, stands in the sequencer, is marked when it is out of 
 import json
 import os
 import pathlib
-import struct
 import subprocess
 import tempfile
 import unittest
 
 import numpy
 
+import gltf
 import sound
 from daemon import BIN, ROOT
 
@@ -22,27 +22,22 @@ BAR_HZ = 22.373 / (2 * numpy.pi) * (210e9 / 7850 / 12) ** 0.5 * 0.015 / 0.3**2
 
 def read_motion(path, name):
     """Positions (F, 3) of a node of a binary glTF, in single precision."""
-    data = path.read_bytes()
-    length = struct.unpack_from("<I", data, 12)[0]
-    gltf = json.loads(data[20:20 + length])
-    animation = gltf["animations"][0]
-    node = next(i for i, node in enumerate(gltf["nodes"]) if node["name"] == name)
+    document, buffer = gltf.read(path)
+    animation = document["animations"][0]
+    node = next(i for i, node in enumerate(document["nodes"]) if node["name"] == name)
     channel = next(c for c in animation["channels"] if c["target"] == {"node": node, "path": "translation"})
-    accessor = gltf["accessors"][animation["samplers"][channel["sampler"]]["output"]]
-    first = 28 + length + gltf["bufferViews"][accessor["bufferView"]]["byteOffset"]
-    return numpy.frombuffer(data, "<f4", 3 * accessor["count"], first).reshape(-1, 3)
+    return gltf.array(document, buffer, animation["samplers"][channel["sampler"]]["output"])
 
 
 class BlenderTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        cls.addClassCleanup(scratch.cleanup)
-        cls.folder = pathlib.Path(scratch.name)
+        scratch = cls.enterClassContext(tempfile.TemporaryDirectory(prefix="carillon-"))
+        cls.folder = pathlib.Path(scratch)
         (cls.folder / "addons").mkdir()
         (cls.folder / "addons" / "carillon_blender").symlink_to(ROOT / "client_sdk" / "blender")
-        environment = os.environ | {"PATH": f"{BIN}:/usr/bin:/bin", "HOME": scratch.name,
-                                    "XDG_RUNTIME_DIR": scratch.name, "XDG_STATE_HOME": scratch.name}
+        environment = os.environ | {"PATH": f"{BIN}:/usr/bin:/bin", "HOME": scratch, "XDG_RUNTIME_DIR": scratch,
+                                    "XDG_STATE_HOME": scratch}
         environment.pop("CARILLON_SERVER", None)  # so that each bake starts a daemon of its own
         done = subprocess.run(
             ["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python",
@@ -125,7 +120,3 @@ class BlenderTest(unittest.TestCase):
         self.assertEqual(self.found["keyed"]["result"], ["FINISHED"], self.found["keyed"])
         samples = sound.read_wave(self.folder / "carillon" / "keyed-Scene" / "sound.wav").sum(axis=-1)
         self.assertAlmostEqual(self.onset_s(samples), self.found["keyed lands"], delta=0.001)
-
-
-if __name__ == "__main__":
-    unittest.main()

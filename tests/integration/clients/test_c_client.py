@@ -3,22 +3,16 @@
 
 import ctypes
 import os
-import pathlib
 import re
 import subprocess
-import time
-import unittest
 
 import numpy
 
 import carillon
 import meshes
-from daemon import ROOT, DaemonTest
+from daemon import BUILD, ROOT, DaemonTest, wait_until
 
-BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
-VERTICES = [(x, y, z) for x in (0, 0.2) for y in (0, 0.03) for z in (0, 0.01)]
-TRIANGLES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
-             (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+BAR = meshes.box((0.2, 0.03, 0.01))
 
 
 class Vec3(ctypes.Structure):
@@ -46,6 +40,18 @@ IMPACT, FORCE = 1, 2
 
 def impact(handle, point, impulse, duration_s=0.0):
     return Contact(IMPACT, handle, point, impulse, duration_s=duration_s)
+
+
+def blow(handle):
+    """A strike at an end of the bar."""
+    return impact(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
+
+
+def installed(folder):
+    """The clients of C++ and C, installed in a folder; returns the library for C."""
+    subprocess.run(["cmake", "--install", BUILD, "--component", "sdk", "--prefix", folder], check=True,
+                   stdout=subprocess.DEVNULL)
+    return next(folder.rglob("libcarillon.so"))
 
 
 class Quaternion(ctypes.Structure):
@@ -90,116 +96,121 @@ class CClientTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.prefix = cls.folder / "prefix"
-        subprocess.run(["cmake", "--install", BUILD, "--component", "sdk", "--prefix", cls.prefix], check=True,
-                       stdout=subprocess.DEVNULL)
-        cls.library = next(cls.prefix.rglob("libcarillon.so"))
-        cls.c = ctypes.CDLL(str(cls.library))
-        for text in (cls.c.carillon_error, cls.c.carillon_error_reason, cls.c.carillon_warnings):
+        cls.prefix = cls.folder / "carillon"
+        cls.library = installed(cls.prefix)
+        cls.calls = calls = ctypes.CDLL(str(cls.library))
+        for text in (calls.carillon_error, calls.carillon_error_reason, calls.carillon_warnings,
+                     calls.carillon_scene_name):
             text.restype = ctypes.c_char_p
-        cls.c.carillon_scene_name.restype = ctypes.c_char_p
-        cls.c.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p]
-        cls.c.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p,
+        calls.carillon_open_stream.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p]
+        calls.carillon_create_trace.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_int32, ctypes.c_void_p,
                                                 ctypes.c_void_p]
         cls.connection = ctypes.c_void_p()
-        assert cls.c.carillon_connect(cls.daemon.server.encode(), ctypes.byref(cls.connection)) == 0
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.c.carillon_disconnect(cls.connection)
-
-    def model_of_arrays(self, vertices, triangles):
-        corners, indices = numpy.array(vertices, "f8"), numpy.array(triangles, "u4")
-        name = ctypes.create_string_buffer(96)
+        assert calls.carillon_connect(cls.daemon.server.encode(), ctypes.byref(cls.connection)) == 0
+        cls.addClassCleanup(calls.carillon_disconnect, cls.connection)
+        corners, indices = numpy.array(BAR[0], "f8"), numpy.array(BAR[1], "u4")
+        cls.model = ctypes.create_string_buffer(96)
         mesh = Mesh(corners.ctypes.data, len(corners), indices.ctypes.data, len(indices))
-        code = self.c.carillon_create_model_of_mesh(self.connection, ctypes.byref(mesh), meshes.MATERIAL.encode(), name)
-        return code, name.value.decode()
+        assert calls.carillon_create_model_of_mesh(cls.connection, ctypes.byref(mesh), meshes.MATERIAL.encode(),
+                                                   cls.model) == 0, calls.carillon_error()
+
+    def done(self, code):
+        self.assertEqual(code, 0, self.calls.carillon_error())
+
+    def refused(self, code, pattern):
+        """The call with this result was refused as invalid, with an error that matches."""
+        self.assertEqual(code, 3)
+        self.assertRegex(self.calls.carillon_error(), pattern)
+
+    def make(self, function, *arguments):
+        """What a function of the library makes."""
+        made = ctypes.c_void_p()
+        self.done(function(*arguments, ctypes.byref(made)))
+        return made
+
+    def make_scene(self):
+        scene = self.make(self.calls.carillon_create_scene, self.connection, None)
+        self.addCleanup(self.calls.carillon_delete_scene, scene)
+        return scene
+
+    def open_stream(self, scene):
+        return self.make(self.calls.carillon_open_stream, scene, 1 / 60, 0)
+
+    def send(self, stream, *contacts):
+        """The result of a step with these contacts."""
+        rows = (Contact * len(contacts))(*contacts)
+        return self.calls.carillon_send(stream, ctypes.byref(Step(contacts=rows, contact_count=len(rows))))
+
+    def bar(self, handle=0):
+        return Object(self.model.value, meshes.MATERIAL.encode(), handle=handle)
 
     def test_the_program_of_the_page_strikes_a_bell(self):
         page = (ROOT / "docs/ten_minutes_c.md").read_text()
         (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```", page)[1])
         (self.folder / "bowl.obj").write_bytes(meshes.bowl())
-        subprocess.run(["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", self.folder / "strike.c",
-                        "-o", self.folder / "strike", f"-I{self.prefix}/include", f"-L{self.library.parent}",
-                        "-lcarillon", f"-Wl,-rpath,{self.library.parent}"], check=True)
-        environment = {**os.environ, "CARILLON_SERVER": self.daemon.server}
-        subprocess.run([self.folder / "strike", self.folder / "bowl.obj"], env=environment, check=True,
-                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        with carillon.connect(self.daemon.server) as c, c.recording() as heard:
-            with subprocess.Popen([self.folder / "strike", self.folder / "bowl.obj"], env=environment,
-                                  stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as striker:
+        compiles = re.search(r"(?m)^    libraries=.*\n    gcc .*\n", page)[0]
+        options = {"cwd": self.folder, "text": True,
+                   "env": {**os.environ, "CARILLON_SERVER": self.daemon.server, "HOME": str(self.folder)}}
+        subprocess.run(["bash", "-euc", compiles.replace("gcc", "gcc -pedantic -Wall -Wextra -Werror")], check=True,
+                       **options)
+        subprocess.run(["./strike", "bowl.obj"], check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                       **options)
+        with self.c.recording() as heard:
+            with subprocess.Popen(["./strike", "bowl.obj"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                  **options) as striker:
                 heard.take(2.0)
                 said = striker.communicate("\n")[0]
             self.assertEqual((striker.returncode, said), (0, "strikes in time: 1\n"))
             self.assertGreater(heard.sound.peak, 1e-4)
-        failed = subprocess.run([self.folder / "strike", "none.obj"], env=environment, check=False,
-                                stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        failed = subprocess.run(["./strike", "none.obj"], check=False, stdin=subprocess.DEVNULL, capture_output=True,
+                                **options)
         self.assertEqual(failed.returncode, 1)
         self.assertIn("strike: FILE_NOT_FOUND: none.obj", failed.stderr)
 
     def test_what_is_probably_wrong_with_contacts_is_told(self):
-        scene, stream, handle, report = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_uint32(), Report()
-        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
-        self.assertEqual(code, 0)
-        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
-        self.addCleanup(self.c.carillon_delete_scene, scene)
-        bar = Object(model.encode(), meshes.MATERIAL.encode())
-        self.assertEqual(self.c.carillon_add_object(scene, ctypes.byref(bar), ctypes.byref(handle)), 0)
+        scene, handle, report = self.make_scene(), ctypes.c_uint32(), Report()
+        self.done(self.calls.carillon_add_object(scene, ctypes.byref(self.bar()), ctypes.byref(handle)))
 
         def warnings_of(*impacts):
-            self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
-            rows = (Contact * len(impacts))(*impacts)
-            step = Step(contacts=rows, contact_count=len(rows))
-            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
+            stream = self.open_stream(scene)
+            self.done(self.send(stream, *impacts))
             for name in ("contact_count", "pose_count"):
-                empty = Step(**{name: 3})
-                self.assertEqual(self.c.carillon_send(stream, ctypes.byref(empty)), 3)
-                self.assertRegex(self.c.carillon_error(), b"^INVALID_SETTINGS: an array of the step is a null pointer")
-            self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0)
-            return self.c.carillon_warnings().decode().splitlines()
+                self.refused(self.calls.carillon_send(stream, ctypes.byref(Step(**{name: 3}))),
+                             b"^INVALID_SETTINGS: an array of the step is a null pointer")
+            self.done(self.calls.carillon_close_stream(stream, ctypes.byref(report)))
+            return self.calls.carillon_warnings().decode().splitlines()
 
-        point, blow = Vec3(0.1, 0.015, 0.01), Vec3(0, 0, -1e-3)
-        self.assertEqual(warnings_of(impact(handle, point, blow)), [])
-        far, lost = warnings_of(impact(99, point, blow), impact(handle, Vec3(100, 15, 10), blow))[::-1]
+        point, push = Vec3(0.1, 0.015, 0.01), Vec3(0, 0, -1e-3)
+        self.assertEqual(warnings_of(impact(handle, point, push)), [])
+        far, lost = warnings_of(impact(99, point, push), impact(handle, Vec3(100, 15, 10), push))[::-1]
         self.assertRegex(far, "^POINTS_DISTANT: ")
         self.assertRegex(lost, "^CONTACTS_REJECTED: .* OBJECT_NOT_FOUND: ")
-        for wrong in (Contact(3, handle, point, blow), Contact(IMPACT, handle, point, Vec3(), blow),
-                      Contact(0, handle, point, blow, blow), Contact(FORCE, handle, point, blow)):
-            self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
-            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(Step(contacts=ctypes.pointer(wrong),
-                                                                            contact_count=1))), 3)
-            self.assertRegex(self.c.carillon_error(), b"^INVALID_SETTINGS: .* contact")
-            self.assertEqual(self.c.carillon_close_stream(stream, None), 0)
+        for wrong in (Contact(3, handle, point, push), Contact(IMPACT, handle, point, Vec3(), push),
+                      Contact(0, handle, point, push, push), Contact(FORCE, handle, point, push)):
+            stream = self.open_stream(scene)
+            self.refused(self.send(stream, wrong), b"^INVALID_SETTINGS: .* contact")
+            self.done(self.calls.carillon_close_stream(stream, None))
         for step_s in (0, -1, 10, float("nan")):
-            self.assertEqual(self.c.carillon_create_trace(b"x.contacts", step_s, 0, None, ctypes.byref(stream)), 3)
-            self.assertRegex(self.c.carillon_error(), b"^INVALID_STREAM: step_s is .* from 1e-6 to 1 s")
+            self.refused(self.calls.carillon_create_trace(b"x.contacts", step_s, 0, None, ctypes.byref(stream)),
+                         b"^INVALID_STREAM: step_s is .* from 1e-6 to 1 s")
 
     def test_what_the_daemon_cannot_read_is_refused_with_a_reason(self):
-        scene, stream, trace, sound = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p(), Sound()
-        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
-        self.addCleanup(self.c.carillon_delete_scene, scene)
-        lasting = ctypes.c_void_p()
+        scene, sound = self.make_scene(), Sound()
         registration = Registration(b"large", None, None, 0)
-        self.assertEqual(self.c.carillon_register_scene(self.connection, ctypes.byref(registration),
-                                                        ctypes.byref(lasting)), 0)
-        self.addCleanup(self.c.carillon_delete_scene, lasting)
-        many = (Contact * 100_000)(*(impact(1, Vec3(1, 1, 1), Vec3(1, 1, 1)) for _ in range(100_000)))
-        step = Step(contacts=many, contact_count=len(many))
+        lasting = self.make(self.calls.carillon_register_scene, self.connection, ctypes.byref(registration))
+        self.addCleanup(self.calls.carillon_delete_scene, lasting)
+        many = [impact(1, Vec3(1, 1, 1), Vec3(1, 1, 1))] * 100_000
         for struck in (scene, lasting):
-            self.assertEqual(self.c.carillon_open_stream(struck, 1 / 60, 0, ctypes.byref(stream)), 0)
-            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 3)
-            self.assertRegex(self.c.carillon_error(), b"^STEP_TOO_LARGE: a step of .* bytes: the daemon takes at most")
-            # The stream goes on.
-            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(Step())), 0)
-            self.assertEqual(self.c.carillon_close_stream(stream, None), 0)
+            stream = self.open_stream(struck)
+            self.refused(self.send(stream, *many), b"^STEP_TOO_LARGE: a step of .* bytes: the daemon takes at most")
+            self.done(self.send(stream))  # the stream goes on
+            self.done(self.calls.carillon_close_stream(stream, None))
         bar = Object(b"modalModels/\xff", meshes.MATERIAL.encode())
-        self.assertEqual(self.c.carillon_add_object(scene, ctypes.byref(bar), None), 12)
-        self.assertRegex(self.c.carillon_error(), b"^REQUEST_MALFORMED: .* text in UTF-8")
+        self.assertEqual(self.calls.carillon_add_object(scene, ctypes.byref(bar), None), 12)
+        self.assertRegex(self.calls.carillon_error(), b"^REQUEST_MALFORMED: .* text in UTF-8")
         file = str(self.folder / "empty.contacts").encode()
-        self.assertEqual(self.c.carillon_create_trace(file, 1 / 60, 0, None, ctypes.byref(trace)), 0)
-        self.assertEqual(self.c.carillon_close_trace(trace), 0)
-        self.assertEqual(self.c.carillon_render(self.connection, file, None, ctypes.byref(sound)), 3)
-        self.assertRegex(self.c.carillon_error(), b"^TRACE_EMPTY: ")
+        self.done(self.calls.carillon_close_trace(self.make(self.calls.carillon_create_trace, file, 1 / 60, 0, None)))
+        self.refused(self.calls.carillon_render(self.connection, file, None, ctypes.byref(sound)), b"^TRACE_EMPTY: ")
 
     def test_only_functions_of_the_header_are_exported(self):
         listed = subprocess.run(["nm", "-D", "--defined-only", self.library], check=True, capture_output=True,
@@ -209,161 +220,133 @@ class CClientTest(DaemonTest):
         declared = set(re.findall(r"^(?:carillon_code|void|const char\*) (carillon_\w+)\(", header, re.MULTILINE))
         self.assertEqual(exported, declared)
 
-    def write_trace(self, file, steps, frame=0, hearing=None):
-        """A trace of a bar. `steps` makes them for its handle. Returns the name of the bar's model."""
-        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
-        self.assertEqual(code, 0, self.c.carillon_error())
-        trace = ctypes.c_void_p()
-        code = self.c.carillon_create_trace(file.encode(), 1 / 60, frame, hearing, ctypes.byref(trace))
-        self.assertEqual(code, 0, self.c.carillon_error())
-        handle = ctypes.c_uint32()
-        bar = Object(model=model.encode(), material=meshes.MATERIAL.encode())
-        self.assertEqual(self.c.carillon_trace_object(trace, ctypes.byref(bar), ctypes.byref(handle)), 0)
+    def write_trace(self, name, steps, frame=0, hearing=None):
+        """A trace of the bar. `steps` makes them for its handle. Returns its file."""
+        file, handle = str(self.folder / name), ctypes.c_uint32()
+        trace = self.make(self.calls.carillon_create_trace, file.encode(), 1 / 60, frame, hearing)
+        self.done(self.calls.carillon_trace_object(trace, ctypes.byref(self.bar()), ctypes.byref(handle)))
         for step in steps(handle):
-            self.assertEqual(self.c.carillon_trace_step(trace, ctypes.byref(step)), 0)
-        self.assertEqual(self.c.carillon_close_trace(trace), 0)
-        return model
+            self.done(self.calls.carillon_trace_step(trace, ctypes.byref(step)))
+        self.done(self.calls.carillon_close_trace(trace))
+        return file
 
     def render(self, file, channel_count=1):
         sound = Sound()
         settings = RenderSettings(44100, channel_count, 0.5)
-        code = self.c.carillon_render(self.connection, file.encode(), ctypes.byref(settings), ctypes.byref(sound))
-        self.assertEqual(code, 0, self.c.carillon_error())
+        self.done(self.calls.carillon_render(self.connection, file.encode(), ctypes.byref(settings),
+                                             ctypes.byref(sound)))
         samples = numpy.ctypeslib.as_array(sound.samples, (sound.frame_count, sound.channel_count)).copy()
-        self.c.carillon_free_sound(ctypes.byref(sound))
+        self.calls.carillon_free_sound(ctypes.byref(sound))
         return samples
 
     def test_a_trace_renders_to_the_samples_that_python_gets(self):
-        def steps(handle):
-            blow = impact(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-            return [Step(0.0, ctypes.pointer(blow), 1)]
-
-        file = str(self.folder / "c.contacts")
-        model = self.write_trace(file, steps)
-        samples = self.render(file)
-        with carillon.connect(self.daemon.server) as c:
-            same = c.render(file, sample_rate_hz=44100, tail_s=0.5)
-            # Equal arrays are one model, from whichever language they come.
-            self.assertEqual(c.create_model((VERTICES, TRIANGLES), meshes.MATERIAL).name, model)
+        file = self.write_trace("c.contacts", lambda handle: [Step(0.0, ctypes.pointer(blow(handle)), 1)])
+        same = self.c.render(file, sample_rate_hz=44100, tail_s=0.5)
+        # Equal arrays are one model, from whichever language they come.
+        self.assertEqual(self.c.create_model(BAR, meshes.MATERIAL).name, self.model.value.decode())
         self.assertGreater(same.peak, 1e-5)
-        numpy.testing.assert_array_equal(samples, same.samples)
+        numpy.testing.assert_array_equal(self.render(file), same.samples)
 
     def test_a_trace_in_slow_motion_and_with_a_pause_renders_to_the_samples_that_python_gets(self):
-        scales = (0, 0.25, -1, 4)
-
         def steps(handle):
-            blow = impact(handle, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-            return [Step(0.125 * i, ctypes.pointer(blow), 1, time_scale=scale) for i, scale in enumerate(scales)]
+            return [Step(0.125 * i, ctypes.pointer(blow(handle)), 1, time_scale=scale)
+                    for i, scale in enumerate((0, 0.25, -1, 4))]
 
-        file = str(self.folder / "slow.contacts")
-        model = self.write_trace(file, steps)
         trace = carillon.Trace(1 / 60)
-        handle = trace.add(model, meshes.MATERIAL)
+        handle = trace.add(self.model.value.decode(), meshes.MATERIAL)
         for i, scale in enumerate((None, 0.25, 0, 4)):
             trace.step(0.125 * i, impacts=carillon.Impacts(handle, (0.2, 0.015, 0.01), (0, 0, -0.01), durations=1e-4),
                        time_scale=scale)
-        samples = self.render(file)
-        with carillon.connect(self.daemon.server) as c:
-            same = c.render(trace, sample_rate_hz=44100, tail_s=0.5)
+        samples = self.render(self.write_trace("slow.contacts", steps))
+        same = self.c.render(trace, sample_rate_hz=44100, tail_s=0.5)
         # Columns have floats, and rows doubles.
         numpy.testing.assert_allclose(samples, same.samples, atol=1e-4 * same.peak)
         self.assertAlmostEqual(len(samples) / 44100, 0.5 + 1 / 60 + 0.125 / 4 + 0.5, delta=0.005)
 
     def assert_keeps_time(self, send):
-        for time_s, code in ((1.0, 0), (float("nan"), 3), (1.1e10, 3), (0.5, 3), (2.0, 0)):
-            self.assertEqual(send(ctypes.byref(Step(time_s))), code)
-            if code:
-                refused = self.c.carillon_error()
-                self.assertRegex(refused, b"^INVALID_STREAM: .*(goes back .* at step 1|step 1 is (nan|1.1e\\+10)); ")
+        for time_s, is_taken in ((1.0, True), (float("nan"), False), (1.1e10, False), (0.5, False), (2.0, True)):
+            code = send(ctypes.byref(Step(time_s)))
+            if is_taken:
+                self.done(code)
+            else:
+                self.refused(code, b"^INVALID_STREAM: .*(goes back .* at step 1|step 1 is (nan|1.1e\\+10)); ")
 
     def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_at_once(self):
-        file, trace = str(self.folder / "back.contacts"), ctypes.c_void_p()
-        self.assertEqual(self.c.carillon_create_trace(file.encode(), 1 / 60, 0, None, ctypes.byref(trace)), 0)
-        self.assert_keeps_time(lambda step: self.c.carillon_trace_step(trace, step))
-        self.assertEqual(self.c.carillon_close_trace(trace), 0)
+        file, report = str(self.folder / "back.contacts"), Report()
+        trace = self.make(self.calls.carillon_create_trace, file.encode(), 1 / 60, 0, None)
+        self.assert_keeps_time(lambda step: self.calls.carillon_trace_step(trace, step))
+        self.done(self.calls.carillon_close_trace(trace))
         self.assertEqual([step.time_s for step in carillon.Trace.read(file).steps], [1, 2])
-        scene, stream, report = ctypes.c_void_p(), ctypes.c_void_p(), Report()
-        self.assertEqual(self.c.carillon_create_scene(self.connection, None, ctypes.byref(scene)), 0)
-        self.addCleanup(self.c.carillon_delete_scene, scene)
-        self.assertEqual(self.c.carillon_open_stream(scene, 1 / 60, 0, ctypes.byref(stream)), 0)
-        self.assert_keeps_time(lambda step: self.c.carillon_send(stream, step))
-        self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0)
+        stream = self.open_stream(self.make_scene())
+        self.assert_keeps_time(lambda step: self.calls.carillon_send(stream, step))
+        self.done(self.calls.carillon_close_stream(stream, ctypes.byref(report)))
         self.assertEqual(report.step_count, 2)
 
     def test_a_placed_bar_is_heard_from_its_place(self):
         """The bar is 2 m to the right of the listener, who looks along -z from z = 1 m."""
-        at = Vec3(2, 0, 1)
-
-        def blow(handle, point, listener=None):
-            pose, struck = Pose(handle, at), impact(handle, point, Vec3(0, 0, -0.01), 1e-4)
-            return [Step(0.0, ctypes.pointer(struck), 1, ctypes.pointer(pose), 1,
-                         listener and ctypes.pointer(listener))]
-
+        at, here = Vec3(2, 0, 1), Vec3(0.2, 0.015, 0.01)
         hearing = Hearing(distance_gain=1, propagation_delay=1, panning=1, listener=Pose(0, Vec3(0, 0, 1)))
-        here, file = Vec3(0.2, 0.015, 0.01), str(self.folder / "placed.contacts")
-        self.write_trace(file, lambda handle: blow(handle, here), 0, ctypes.byref(hearing))
-        left, right = self.render(file, 2).T
+
+        def heard(point, frame=0, listener=None, hearing=ctypes.byref(hearing)):
+            def steps(handle):
+                pose, struck = Pose(handle, at), impact(handle, point, Vec3(0, 0, -0.01), 1e-4)
+                return [Step(0.0, ctypes.pointer(struck), 1, ctypes.pointer(pose), 1,
+                             listener and ctypes.pointer(listener))]
+            return self.render(self.write_trace("placed.contacts", steps, frame, hearing), 2).T
+
+        left, right = heard(here)
         self.assertGreater(abs(right).max(), 1e-5)
         self.assertLess(abs(left).max(), 1e-3 * abs(right).max())
         # The same point in the frame of the scene gives the same sound.
-        self.write_trace(file, lambda handle: blow(handle, Vec3(here.x + at.x, here.y + at.y, here.z + at.z)), 1,
-                         ctypes.byref(hearing))
-        again = self.render(file, 2)[:, 1]
+        again = heard(Vec3(here.x + at.x, here.y + at.y, here.z + at.z), frame=1)[1]
         numpy.testing.assert_allclose(again, right, atol=1e-3 * abs(right).max())
         # A listener who has turned round hears it from the left.
-        turned = Pose(0, Vec3(0, 0, 1), Quaternion(0, 0, 1, 0))
-        self.write_trace(file, lambda handle: blow(handle, here, turned), 0, ctypes.byref(hearing))
-        numpy.testing.assert_allclose(self.render(file, 2)[:, 0], right, atol=1e-3 * abs(right).max())
+        turned = heard(here, listener=Pose(0, Vec3(0, 0, 1), Quaternion(0, 0, 1, 0)))
+        numpy.testing.assert_allclose(turned[0], right, atol=1e-3 * abs(right).max())
         # Without a hearing the bar sounds at 1 m, at once, and on both channels.
-        self.write_trace(file, lambda handle: blow(handle, here))
-        plain = self.render(file, 2)
-        numpy.testing.assert_array_equal(*plain.T)
+        plain = heard(here, hearing=None)
+        numpy.testing.assert_array_equal(*plain)
         delay = int(2 / 343 * 44100)
-        first = [numpy.flatnonzero(abs(sound) > 0.05 * abs(sound).max())[0] for sound in (plain[:, 0], right)]
+        first = [numpy.flatnonzero(abs(sound) > 0.05 * abs(sound).max())[0] for sound in (plain[0], right)]
         self.assertAlmostEqual(first[1] - first[0], delay, delta=20)
 
     def test_hearings_and_frames_that_are_none_are_refused(self):
         made, hearing = ctypes.c_void_p(), Hearing(near_field=1)
-        refused = self.c.carillon_create_scene(self.connection, ctypes.byref(hearing), ctypes.byref(made))
-        self.assertEqual((refused, self.c.carillon_error_reason()), (3, b"INVALID_SETTINGS"))
-        refused = self.c.carillon_create_trace(str(self.folder / "x").encode(), 0.01, 7, None, ctypes.byref(made))
-        self.assertEqual(refused, 3)
-        self.assertIn(b"the frame is 7", self.c.carillon_error())
+        self.refused(self.calls.carillon_create_scene(self.connection, ctypes.byref(hearing), ctypes.byref(made)),
+                     b"^INVALID_SETTINGS: ")
+        self.assertEqual(self.calls.carillon_error_reason(), b"INVALID_SETTINGS")
+        self.refused(self.calls.carillon_create_trace(str(self.folder / "x").encode(), 0.01, 7, None,
+                                                      ctypes.byref(made)), b"the frame is 7")
 
     def test_a_registered_scene_outlives_its_daemon(self):
-        code, model = self.model_of_arrays(VERTICES, TRIANGLES)
-        self.assertEqual(code, 0, self.c.carillon_error())
-        bars = (Object * 2)(*(Object(model.encode(), meshes.MATERIAL.encode(), handle=handle) for handle in (5, 9)))
+        bars = (Object * 2)(self.bar(5), self.bar(9))
         registration = Registration(b"lathe-1", None, bars, 2)
-        scene, again, stream = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
+        scene, again = (self.make(self.calls.carillon_register_scene, self.connection, ctypes.byref(registration))
+                        for _ in range(2))
         for made in (scene, again):
-            code = self.c.carillon_register_scene(self.connection, ctypes.byref(registration), ctypes.byref(made))
-            self.assertEqual(code, 0, self.c.carillon_error())
-            self.assertEqual(self.c.carillon_scene_name(made), b"scenes/lathe-1")
-        self.assertEqual(self.c.carillon_open_stream(scene, 0.01, 0, ctypes.byref(stream)), 0)
+            self.assertEqual(self.calls.carillon_scene_name(made), b"scenes/lathe-1")
+        stream = self.open_stream(scene)
         self.daemon.kill()
         self.daemon.start()
-        step = Step(0.0)
-        handles, end_s = [], time.monotonic() + 30
-        with carillon.connect(self.daemon.server) as c:
-            while handles != [5, 9] and time.monotonic() < end_s:
-                step.time_s += 0.01
-                self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0, self.c.carillon_error())
-                time.sleep(0.01)
-                handles = [item.handle for scene_there in c.scenes() for item in scene_there.objects()]
-        self.assertEqual(handles, [5, 9])
-        blow = impact(9, Vec3(0.2, 0.015, 0.01), Vec3(0, 0, -0.01), 1e-4)
-        step.contacts, step.contact_count, step.time_s = ctypes.pointer(blow), 1, step.time_s + 0.01
-        report = Report()
-        while report.accepted_count + report.late_count == 0 and time.monotonic() < end_s:
-            self.assertEqual(self.c.carillon_send(stream, ctypes.byref(step)), 0)
-            self.assertEqual(self.c.carillon_close_stream(stream, ctypes.byref(report)), 0, self.c.carillon_error())
-            self.assertEqual(self.c.carillon_open_stream(scene, 0.01, 0, ctypes.byref(stream)), 0)
+        step, report = Step(0.0), Report()
+
+        def handles():
+            step.time_s += 0.01
+            self.done(self.calls.carillon_send(stream, ctypes.byref(step)))
+            with carillon.connect(self.daemon.server) as c:
+                return [item.handle for scene_there in c.scenes() for item in scene_there.objects()]
+
+        def struck_count():
+            nonlocal stream
+            self.done(self.calls.carillon_send(stream, ctypes.byref(step)))
+            self.done(self.calls.carillon_close_stream(stream, ctypes.byref(report)))
+            stream = self.open_stream(scene)
+            return report.accepted_count + report.late_count
+
+        wait_until(lambda: handles() == [5, 9])
+        step.contacts, step.contact_count, step.time_s = ctypes.pointer(blow(9)), 1, step.time_s + 0.01
+        wait_until(struck_count)
         self.assertEqual(report.accepted_count + report.late_count, 1)
-        self.c.carillon_close_stream(stream, None)
-        self.c.carillon_delete_scene(again)
-        self.c.carillon_delete_scene(scene)
-
-
-if __name__ == "__main__":
-    unittest.main()
+        self.calls.carillon_close_stream(stream, None)
+        self.calls.carillon_delete_scene(again)
+        self.calls.carillon_delete_scene(scene)

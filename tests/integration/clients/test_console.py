@@ -10,15 +10,13 @@ import subprocess
 import tarfile
 import threading
 import time
-import unittest
 
 import carillon
 import meshes
-from daemon import BIN, ROOT, DaemonTest
+from daemon import BIN, BUILD, ROOT, DaemonTest
 
 # Of the bar in structural steel, whose speed of sound is sqrt(E/rho).
 BAR_HZ = meshes.bar_first_bending_hz() * math.sqrt(2.1e11 / 7850 * meshes.DENSITY / meshes.YOUNG_PA)
-BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -65,8 +63,7 @@ class ConsoleTest(DaemonTest):
 
         Returns both files.
         """
-        with carillon.connect(self.daemon.server) as client:
-            bar = client.create_model(self.bar, material="structural_steel")
+        bar = self.c.create_model(self.bar, material="structural_steel")
         damped = carillon.material("structural_steel", loss_factor=0.02)  # each blow is over before the next
         for name, right in (("flight", "right"), ("page", "right</script>")):
             trace = carillon.Trace(step=0.1)
@@ -141,7 +138,3 @@ class ConsoleTest(DaemonTest):
                                 check=False)
         self.assertEqual(status.returncode, 0, status.stderr)
         self.assertIsNone(program.poll())
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The clients of C++ and C as users get them: installed by the commands of CONTRIBUTING.md, found by
-CMake, pkg-config and the compiler, and sounding."""
+"""The client of C++ as users get it: installed by the commands of CONTRIBUTING.md, found by CMake, pkg-config and the
+compiler, and sounding."""
 
 import os
-import pathlib
 import re
 import shlex
 import subprocess
-import unittest
 
 import numpy
 
+import carillon
 import meshes
-from carillon.v1 import material_pb2
-from daemon import ROOT, DaemonTest
+from daemon import BUILD, ROOT, DaemonTest
 
-BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
 EXAMPLE = ROOT / "client_sdk/examples/strike"
 # Whatever else a build of the daemon looks for.
 NOT_FOR_THE_CLIENT = ("GTest", "benchmark", "CLI11", "nlohmann_json", "spdlog", "tomlplusplus",
@@ -34,7 +31,6 @@ def commands(page, heading):
 
 
 INSTALL, FIND = commands("CONTRIBUTING.md", "Install the clients from a build")
-COMPILE_C, = commands("docs/ten_minutes_c.md", "Install")
 
 
 class InstalledClientTest(DaemonTest):
@@ -47,8 +43,7 @@ class InstalledClientTest(DaemonTest):
         (cls.folder / "build").mkdir()
         (cls.folder / "build/release").symlink_to(BUILD)
         cls.bash(INSTALL)
-        cls.model = cls.client.wait(cls.client.create(
-            meshes.bowl(), "obj", material=material_pb2.Material(preset="bell_bronze")))
+        cls.model = cls.client.model(meshes.bowl(), material=carillon.material("bell_bronze"))
 
     @classmethod
     def bash(cls, text, **options):
@@ -84,13 +79,6 @@ class InstalledClientTest(DaemonTest):
         self.assertRegex(said.stdout, r"^blows: [3-9], loads: \d{2,}\n$")
         none = self.bash("CARILLON_SERVER=unix:/nowhere ./fall modalModels/0 2>&1 || true").stdout
         self.assertRegex(none, "^(?!terminate).*/nowhere")
-
-    def test_a_program_in_c_strikes_a_running_daemon(self):
-        page = (ROOT / "docs/ten_minutes_c.md").read_text()
-        (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```$", page)[1])
-        (self.folder / "bowl.obj").write_bytes(meshes.bowl())
-        said = self.bash(f"{COMPILE_C}CARILLON_SERVER={self.daemon.server} ./strike bowl.obj </dev/null")
-        self.assertEqual(said.stdout, "strikes in time: 1\n")
 
     def test_an_older_minor_version_is_not_taken_for_this_one(self):
         project = self.folder / "older"
@@ -128,7 +116,3 @@ class InstalledClientTest(DaemonTest):
         targets = run("cmake", "--build", project / "build", "--target", "help").stdout
         self.assertIn("\ncarillon_client:", targets)
         self.assertNotIn("\ncarillond:", targets)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,36 +2,29 @@
 """The Python package against the real daemon: what it is, scenes with ids, all jobs, and what a rendering tells."""
 
 import asyncio
-import hashlib
 import os
-import pathlib
 import subprocess
 import sys
-import tempfile
 import time
-import unittest
 import warnings
 
 import numpy
 
 import carillon
 import meshes
-from carillon.v1 import audio_service_pb2
-from certificates import Authority
-from daemon import Daemon, DaemonTest
-
-BAR = meshes.box(meshes.BAR_SIZE)
-POINT, IMPULSE, DURATION_S = (0.0, 0.008, 0.010), (0, 0, -0.002), 1e-4
+from certificates import SecuredTest, access_line
+from daemon import ScratchTest
+from test_python_package import BAR, DURATION_S, IMPULSE, POINT, PackageTest
 
 
-class CallsTest(DaemonTest):
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        cls.c = carillon.connect(cls.daemon.server)
-        cls.addClassCleanup(cls.c.close)
-        cls.model = cls.c.create_model(BAR, meshes.MATERIAL, label="bar")
+def run_script(script, **environment):
+    """The words that a program in Python prints."""
+    done = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, check=True, timeout=60,
+                          env={**os.environ, **environment})
+    return done.stdout.split()
 
+
+class CallsTest(PackageTest):
     def test_the_daemon_says_what_it_is(self):
         async def ask():
             async with carillon.aio.connect(self.daemon.server) as c:
@@ -53,68 +46,23 @@ class CallsTest(DaemonTest):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             self.c.scene(hearing={"distance_gain": True}).delete()
-            with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-                daemon = Daemon(folder, "--channels", 2)
-                self.addCleanup(daemon.stop)
-                with carillon.connect(daemon.server) as c:
-                    c.scene(hearing={"panning": True, "binaural": True}).delete()
-                daemon.stop()
-
-    def test_a_recording_counts_the_frames_of_a_stream(self):
-        with self.c.scene() as scene, self.c.recording(scene=scene.name) as record:
-            bar = scene.add(self.model)
-            with scene.stream(step=0.001, delay=1) as stream:
-                stream.step(0.0, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
-            heard = record.take(3)
-        due = stream.report.first_frame + heard.sample_rate_hz - heard.first_frame
-        begin = int(numpy.flatnonzero(numpy.abs(heard.samples[:, 0]) > 1e-4)[0])
-        self.assertLess(abs(begin - due), 48)  # a pulse is centred on its time
-        self.assertEqual(record.sound.first_frame, heard.first_frame + len(heard.samples))
-
-    def test_a_program_goes_on_with_the_same_client_when_its_daemon_has_started_anew(self):
-        with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-            daemon = Daemon(folder)
-            self.addCleanup(daemon.stop)
-            with carillon.connect(daemon.server) as c:
-                model = c.create_model(BAR, meshes.MATERIAL)
-                with self.assertRaises(carillon.ServerUnavailable) as lost, c.scene() as scene, \
-                        scene.stream(step=0.01) as stream:
-                    for number in range(1000):
-                        stream.step(0.01 * number)
-                        if number == 10:
-                            daemon.kill()
-                            daemon.start()
-                        time.sleep(0.01)
-                self.assertTrue(lost.exception.__suppress_context__)
-                for _ in range(60):
-                    try:
-                        with c.scene() as scene:
-                            scene.add(model).strike(POINT, IMPULSE)
-                        break
-                    except carillon.ServerUnavailable:
-                        time.sleep(1)
-                else:
-                    self.fail("the client has not connected again")
-            daemon.stop()
 
     def test_a_scene_with_an_id_is_found_again_with_its_objects(self):
         made = self.c.scene(id="lathe-1", gain=0.5)
         self.assertEqual((made.name, made.existing), ("scenes/lathe-1", False))
         made.add_all([self.model, {"model": self.model, "handle": 7, "gain": 2}])
-        with self.assertRaises(carillon.CarillonError) as raised:
+        with self.assert_refused("OBJECT_EXISTS") as raised:
             made.add_all([self.model, {"model": self.model, "handle": 7}])
-        self.assertEqual((raised.exception.reason, raised.exception.metadata["index"]), ("OBJECT_EXISTS", "1"))
+        self.assertEqual(raised.exception.metadata["index"], "1")
         # Another connection, as after a loss of this one.
         with carillon.connect(self.daemon.server) as other, other.scene(id="lathe-1", gain=0.5) as again:
             self.assertTrue(again.existing)
             self.assertEqual([item.handle for item in again.objects()], [1, 7])
             self.assertEqual((again.get().object_count, again.get().gain), (2, 0.5))
-            with self.assertRaises(carillon.CarillonError) as raised:
+            with self.assert_refused("SCENE_DIFFERS"):
                 other.scene(id="lathe-1")
-            self.assertEqual(raised.exception.reason, "SCENE_DIFFERS")
-        with self.assertRaises(carillon.CarillonError) as raised:
+        with self.assert_refused("SCENE_NOT_FOUND"):
             made.get()
-        self.assertEqual(raised.exception.reason, "SCENE_NOT_FOUND")
 
     def test_jobs_are_watched_and_filtered(self):
         changes = self.c.watch_jobs(label_contains="watched")
@@ -138,9 +86,7 @@ class CallsTest(DaemonTest):
         self.assertIsNone(asyncio.run(watch()))
 
     def test_a_rendering_tells_its_blows(self):
-        trace = carillon.Trace(1 / 60)
-        bar = trace.add(self.model)
-        trace.step(0.25, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
+        trace = self.struck(0.25)
         self.assertEqual(self.c.render(trace, tail_s=0.1).blows, ())
         blow, = self.c.render(trace, tail_s=0.1, tell_blows=True).blows
         self.assertAlmostEqual(blow.time_s, 0.25)
@@ -158,22 +104,16 @@ class CallsTest(DaemonTest):
             return carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S)
 
         moving = trace(1 / 240, impacts=impact, poses=lambda bar: carillon.Poses(bar, [(0, 0, 0)]))
-        with self.assertRaises(carillon.CarillonError) as raised:
+        with self.assert_refused("TRACE_MALFORMED", "milliseconds"):
             self.c.render(moving)
-        self.assertEqual(raised.exception.reason, "TRACE_MALFORMED")
-        self.assertIn("milliseconds", raised.exception.message)
         with self.assertWarns(carillon.ContactWarning):  # STEP_TOO_SHORT
             self.assertEqual(self.c.render(trace(1 / 1000, impacts=impact), tail_s=0.1).samples.size, 12.1 * 48000)
 
     def test_a_rendering_ends_at_its_timeout_and_by_an_interrupt(self):
-        trace = carillon.Trace(1 / 60)
-        bar = trace.add(self.model)
-        for time_s in (0, 80000):
-            trace.step(time_s, impacts=carillon.Impacts(bar, POINT, IMPULSE, durations=DURATION_S))
-        with self.assertRaises(carillon.CarillonError) as raised:
+        trace = self.struck(0, 80000)
+        with self.assert_refused("DEADLINE_EXCEEDED"):
             self.c.render(trace, timeout=0.3)
-        self.assertEqual(raised.exception.reason, "DEADLINE_EXCEEDED")
-        file = self.daemon.folder / "long.contacts"
+        file = self.folder / "long.contacts"
         trace.write(file)
         script = ("import carillon, os, signal, sys, threading\n"
                   "threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
@@ -183,15 +123,10 @@ class CallsTest(DaemonTest):
         self.assertTrue(done.stderr.rstrip().endswith("KeyboardInterrupt"), done.stderr)
 
     def test_soft_and_limited_sounds_are_normalised_alike(self):
-        sounds = []
-        for factor in (1, 1e-5, 1e4):
-            trace = carillon.Trace(1 / 60)
-            bar = trace.add(self.model)
-            trace.step(0.0, impacts=carillon.Impacts(bar, POINT, numpy.multiply(IMPULSE, factor),
-                                                       durations=DURATION_S))
-            sounds.append(self.c.render(trace, normalize=True, tail_s=0.3))
-        for other in sounds[1:]:
-            numpy.testing.assert_allclose(other.samples, sounds[0].samples, atol=1e-4)
+        sound, *others = (self.c.render(self.struck(0.0, factor=factor), normalize=True, tail_s=0.3)
+                          for factor in (1, 1e-5, 1e4))
+        for other in others:
+            numpy.testing.assert_allclose(other.samples, sound.samples, atol=1e-4)
 
     def test_a_trace_sounds_as_its_stream_but_for_the_scheduling_delay(self):
         step_s, hit = 1 / 240, 6
@@ -219,22 +154,16 @@ class CallsTest(DaemonTest):
 
     def blow_live_s(self, steps, step_s):
         """The same of a stream, without the delay that it states."""
-        with self.c.scene() as scene:
+        with self.c.scene() as scene, self.c.recording(scene=scene.name) as record:
             scene.add(self.model, handle=1)
-            answers = self.c.audio_stub.Listen(audio_service_pb2.ListenRequest(scene=scene.name))
-            self.addCleanup(answers.cancel)
-            rate_hz = next(answers).format.sample_rate_hz
             # The delay lets all steps come at once.
             with scene.stream(step_s, delay=0.5) as stream:
                 for time_s, content in steps:
                     stream.step(time_s, **content)
-            for answer in answers:
-                samples = numpy.frombuffer(answer.block.samples, "<f4")
-                if samples.any():
-                    break
-        begin_frame = answer.block.first_frame + int(numpy.flatnonzero(samples)[0])
+            heard = record.take(1)
+        begin_frame = heard.first_frame + int(numpy.flatnonzero(heard.samples)[0])
         # The pulse begins half a duration before the time of the blow.
-        return (begin_frame - stream.report.first_frame) / rate_hz - 0.5 + DURATION_S / 2
+        return (begin_frame - stream.report.first_frame) / heard.sample_rate_hz - 0.5 + DURATION_S / 2
 
     def test_contacts_that_come_late_are_told_once(self):
         with self.c.scene() as scene:
@@ -264,9 +193,7 @@ class CallsTest(DaemonTest):
                 await other.update(gain=0.5)
                 await bar.strike(POINT, IMPULSE, DURATION_S)
                 await other.remove()
-                trace = carillon.Trace()
-                trace.step(0.0, impacts=carillon.Impacts(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
-                return ((await job.refresh()).state, await model.frequencies(), (await c.render(trace)).peak,
+                return ((await job.refresh()).state, await model.frequencies(), (await c.render(self.struck(0.0))).peak,
                         (await model.render_strike(POINT, IMPULSE, duration=DURATION_S)).peak,
                         [item.handle for item in await scene.objects()])
 
@@ -278,9 +205,7 @@ class CallsTest(DaemonTest):
     def test_more_renderings_than_a_client_may_have_wait_in_asyncio(self):
         async def render():
             async with carillon.aio.connect(self.daemon.server) as c:
-                model = await c.model("bar")
-                trace = carillon.Trace()
-                trace.step(0.0, impacts=carillon.Impacts(trace.add(model), POINT, IMPULSE, durations=DURATION_S))
+                model, trace = await c.model("bar"), self.struck(0.0)
                 limits = (await c.info()).limits
                 sounds = await asyncio.gather(
                     *(model.render_strike(POINT, IMPULSE, duration=DURATION_S, seconds=0.1) for _ in range(8)),
@@ -311,14 +236,8 @@ class CallsTest(DaemonTest):
         self.assertEqual((accepted, step_count), (1, 1))
         self.assertGreater(peak, 1e-5)
 
-    def run_script(self, script, **environment):
-        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60,
-                              env={**os.environ, **environment})
-        self.assertEqual(done.returncode, 0, done.stderr)
-        return done.stdout.split()
-
     def test_a_pool_of_forked_processes_uses_the_connection_and_passes_refusals_on(self):
-        said = self.run_script(f"""
+        said = run_script(f"""
 import multiprocessing, carillon
 c = carillon.connect({self.c.server!r})
 c.status()
@@ -335,7 +254,7 @@ print(c.model("bar").mode_count)
         self.assertEqual(said, [str(self.model.mode_count), "MODAL_MODEL_NOT_FOUND", str(self.model.mode_count)])
 
     def test_a_fork_that_grpc_does_not_survive_is_refused_in_the_child(self):
-        said = self.run_script(f"""
+        said = run_script(f"""
 import os, carillon
 c = carillon.connect({self.c.server!r})
 c.status()
@@ -351,52 +270,71 @@ os.waitpid(child, 0)
 """, GRPC_ENABLE_FORK_SUPPORT="")
         self.assertEqual(said, ["refused", "refused"])
 
+    def test_no_transfer_means_no_decay_by_radiation(self):
+        numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))
+
+
+class OwnDaemonTest(ScratchTest):
+    def test_two_ears_need_no_warning_where_the_daemon_plays_two_channels(self):
+        self.serve("--channels", 2)
+        with carillon.connect(self.daemon.server) as c, warnings.catch_warnings():
+            warnings.simplefilter("error")
+            c.scene(hearing={"panning": True, "binaural": True}).delete()
+
+    def test_a_program_goes_on_with_the_same_client_when_its_daemon_has_started_anew(self):
+        self.serve()
+        with carillon.connect(self.daemon.server) as c:
+            model = c.create_model(BAR, meshes.MATERIAL)
+            with self.assertRaises(carillon.ServerUnavailable) as lost, c.scene() as scene, \
+                    scene.stream(step=0.01) as stream:
+                for number in range(1000):
+                    stream.step(0.01 * number)
+                    if number == 10:
+                        self.daemon.kill()
+                        self.daemon.start()
+                    time.sleep(0.01)
+            self.assertTrue(lost.exception.__suppress_context__)
+            for _ in range(60):
+                try:
+                    with c.scene() as scene:
+                        scene.add(model).strike(POINT, IMPULSE)
+                    break
+                except carillon.ServerUnavailable:
+                    time.sleep(1)
+            else:
+                self.fail("the client has not connected again")
+
     def test_a_proxy_for_the_network_is_not_asked_for_this_machine(self):
-        with tempfile.TemporaryDirectory(prefix="carillon-") as folder:
-            daemon = Daemon(folder, "--listen", "127.0.0.1:0")
-            self.addCleanup(daemon.stop)
-            said = self.run_script(f"""
+        self.serve("--listen", "127.0.0.1:0")
+        address = self.daemon.listening[1].split()[-1]
+        said = run_script(f"""
 import asyncio, carillon
 async def ask():
-    async with carillon.aio.connect({daemon.listening[1].split()[-1]!r}) as c:
+    async with carillon.aio.connect({address!r}) as c:
         return await c.info()
-print(carillon.connect({daemon.listening[1].split()[-1]!r}).info().version, asyncio.run(ask()).version)
+print(carillon.connect({address!r}).info().version, asyncio.run(ask()).version)
 """, http_proxy="http://127.0.0.1:1", no_proxy="")
         self.assertEqual(said, [carillon.__version__] * 2)
 
+
+class TokenTest(SecuredTest):
     def test_both_faces_show_their_token(self):
-        folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
-        authority = Authority(folder)
-        certificate, key = authority.issue("server")
-        access = folder / "access"
-        access.touch(0o600)
-        access.write_text(f"robot strike,listen sha256:{hashlib.sha256(b'a token').hexdigest()}\n")
-        daemon = Daemon(folder, "--listen", "127.0.0.1:0", "--tls-certificate", certificate, "--tls-key", key,
-                        "--access-file", access)
-        self.addCleanup(daemon.stop)
-        address, options = daemon.listening[1].split()[-1], {"tls_roots": authority.certificate}
+        self.serve_secured(access_line("robot", "strike,listen", "a token"))
+        options = {"tls_roots": self.authority.certificate}
 
         def step_count(token):
-            with carillon.connect(address, token=token, **options) as c, c.scene() as scene:
+            with carillon.connect(self.address, token=token, **options) as c, c.scene() as scene:
                 with scene.stream(step=0.01) as stream:
                     stream.step(0.0)
                 return stream.report.step_count
 
         async def awaited_step_count(token):
-            async with carillon.aio.connect(address, token=token, **options) as c, await c.scene() as scene:
+            async with carillon.aio.connect(self.address, token=token, **options) as c, await c.scene() as scene:
                 async with scene.stream(step=0.01) as stream:
                     await stream.step(0.0)
                 return stream.report.step_count
 
         for count in step_count, lambda token: asyncio.run(awaited_step_count(token)):
             self.assertEqual(count("a token"), 1)
-            with self.assertRaises(carillon.CarillonError) as refused:
+            with self.assert_refused("TOKEN_WRONG"):
                 count("another")
-            self.assertEqual(refused.exception.reason, "TOKEN_WRONG")
-
-    def test_no_transfer_means_no_decay_by_radiation(self):
-        numpy.testing.assert_array_equal(self.model.radiation_decays(), numpy.zeros(self.model.mode_count))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -4,8 +4,6 @@
 import asyncio
 import pathlib
 import subprocess
-import tempfile
-import unittest
 import warnings
 
 import numpy
@@ -13,8 +11,7 @@ import numpy
 import carillon
 import meshes
 import scripted
-from daemon import BIN, Daemon
-from node import node_environment
+from daemon import BIN, ScratchTest, node_environment
 
 BAR = meshes.box(meshes.BAR_SIZE)
 STRIKE = {"point": (0.0, 0.008, 0.010), "impulse": (0, 0, -0.002), "duration": 1e-4, "seconds": 0.2}
@@ -28,15 +25,11 @@ exec BIN/carillon-precompute "$@"
 """.replace("BIN", str(BIN))
 
 
-class TransfersTest(unittest.TestCase):
+class TransfersTest(ScratchTest):
     def setUp(self):
-        scratch = tempfile.TemporaryDirectory(prefix="carillon-")
-        self.addCleanup(scratch.cleanup)
-        self.folder = pathlib.Path(scratch.name)
-        self.daemon = Daemon(self.folder, "--transfers", "--precompute", scripted.worker(self.folder, WORKER))
-        self.addCleanup(self.daemon.stop)
-        self.c = carillon.connect(self.daemon.server)
-        self.addCleanup(self.c.close)
+        super().setUp()
+        self.serve("--transfers", "--precompute", scripted.worker(self.folder, WORKER))
+        self.c = self.enterContext(carillon.connect(self.daemon.server))
 
     def make(self, **request):
         return self.c.create_model(BAR, meshes.MATERIAL, label="bar", max_frequency_hz=3000,
@@ -45,19 +38,13 @@ class TransfersTest(unittest.TestCase):
     def allow(self):
         (self.folder / "enough").touch()
 
-    def assert_refused(self, reason, words, function, *arguments):
-        with self.assertRaises(carillon.CarillonError) as refused:
-            function(*arguments)
-        self.assertEqual(refused.exception.reason, reason)
-        self.assertIn(words, refused.exception.message)
-
     def test_a_rendering_before_the_transfer_warns_and_one_after_it_does_not(self):
         bar = self.make()
         with self.assertWarnsRegex(carillon.TransferWarning, r"^bar \(transfer\) is still being computed") as told:
             before = bar.render_strike(**STRIKE)
         self.assertEqual(told.filename, __file__)
-        self.assert_refused("DEADLINE_EXCEEDED", "bar (transfer) is running and has not ended after",
-                            bar.wait_for_transfer, 0.2)
+        with self.assert_refused("DEADLINE_EXCEEDED", "bar (transfer) is running and has not ended after"):
+            bar.wait_for_transfer(0.2)
         states = []
         self.allow()
         bar.wait_for_transfer(60, progress_bar=lambda job: states.append(job.label))
@@ -107,7 +94,8 @@ class TransfersTest(unittest.TestCase):
     def test_a_transfer_that_was_cancelled_is_told(self):
         bar = self.make()
         next(job for job in self.c.jobs() if job.is_transfer).cancel()
-        self.assert_refused("JOB_CANCELLED", "was cancelled", bar.wait_for_transfer, 60)
+        with self.assert_refused("JOB_CANCELLED", "was cancelled"):
+            bar.wait_for_transfer(60)
 
     def test_a_transfer_that_fails_is_told(self):
         (self.folder / "fail").touch()
@@ -139,7 +127,3 @@ class TransfersTest(unittest.TestCase):
             env={**node_environment(self.folder), "CARILLON_SERVER": self.daemon.server}, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.assertEqual(done.returncode, 0, done.stdout)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -8,15 +8,14 @@ import pathlib
 import re
 import subprocess
 import textwrap
-import unittest
 
 import numpy
 
 import carillon
 import sound
-from daemon import BIN, ROOT, DaemonTest
+from daemon import BIN, BUILD, ROOT, DaemonTest
+from test_c_client import installed
 
-BUILD = pathlib.Path(os.environ["CARILLON_BUILD_DIR"])
 MOST_LINES = 60
 
 
@@ -24,10 +23,7 @@ class RecipesTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        prefix = cls.folder / "prefix"
-        subprocess.run(["cmake", "--install", BUILD, "--component", "sdk", "--prefix", prefix], check=True,
-                       stdout=subprocess.DEVNULL)
-        cls.include, cls.library = prefix / "include", next(prefix.rglob("libcarillon.so")).parent
+        cls.library = installed(cls.folder / "prefix").parent
         subprocess.run([BIN / "carillon", "example", "bar"], cwd=cls.folder, check=True, stdout=subprocess.DEVNULL)
         cls.environment = {**os.environ, "CARILLON_SERVER": cls.daemon.server, "LD_LIBRARY_PATH": str(cls.library),
                            "PYTHONPATH": str(BUILD / "client_sdk/python")}
@@ -38,47 +34,47 @@ class RecipesTest(DaemonTest):
         (self.folder / name).write_text(program)
         return name
 
-    def compile(self, *words):
-        done = subprocess.run(words, cwd=self.folder, check=False, capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+    def run_here(self, *words, path=()):
+        """What a program in the folder ends with. `path` has folders of packages for Node."""
+        environment = {**self.environment, "NODE_PATH": ":".join(map(str, path))}
+        return subprocess.run(words, cwd=self.folder, env=environment, check=False, capture_output=True, text=True)
+
+    def run_well(self, *words, path=()):
+        """What a program prints that complains about nothing."""
+        done = self.run_here(*words, path=path)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return done.stdout
 
     def hear_the_bar(self, *words):
         """The bar falls, meets the floor once, and lies there in silence."""
-        with carillon.connect(self.daemon.server) as c, c.recording() as heard:
-            done = subprocess.run([*words, "bar.obj"], cwd=self.folder, env=self.environment, check=False,
-                                  capture_output=True, text=True)
+        with self.c.recording() as heard:
+            said = self.run_well(*words, "bar.obj")
             heard.take(0.5)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertEqual(done.stdout, "1 blows sounded, 0 contacts were rejected\n")
+        self.assertEqual(said, "1 blows sounded, 0 contacts were rejected\n")
         self.assertGreater(heard.sound.peak, 1e-4)
-        wrong = subprocess.run([*words, "none.obj"], cwd=self.folder, env=self.environment, check=False,
-                               capture_output=True, text=True)
+        wrong = self.run_here(*words, "none.obj")
         self.assertNotEqual(wrong.returncode, 0)
         self.assertIn("FILE_NOT_FOUND", wrong.stdout + wrong.stderr)
 
     def test_unity(self):
-        self.compile("mcs", self.save("recipe_unity.md", "csharp", "Fall.cs"))
+        self.run_well("mcs", self.save("recipe_unity.md", "csharp", "Fall.cs"))
         self.hear_the_bar("mono", "Fall.exe")
 
     def test_rust(self):
         # Debian's compiler, not one that a user has beside it.
-        self.compile("/usr/bin/rustc", "-O", "-L", self.library, self.save("recipe_rust.md", "rust", "fall.rs"),
-                     "-o", "fall_rust")
+        self.run_well("/usr/bin/rustc", "-O", "-L", self.library, self.save("recipe_rust.md", "rust", "fall.rs"),
+                      "-o", "fall_rust")
         self.hear_the_bar("./fall_rust")
 
     def test_unreal(self):
-        self.compile("g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-Wall", "-Wextra", "-Werror",
-                     self.save("recipe_unreal.md", "cpp", "fall.cpp"), "-o", "fall_unreal", f"-I{self.include}",
-                     f"-L{self.library}", "-lcarillon")
+        self.run_well("g++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-Wall", "-Wextra", "-Werror",
+                      self.save("recipe_unreal.md", "cpp", "fall.cpp"), "-o", "fall_unreal",
+                      f"-I{self.folder}/prefix/include", f"-L{self.library}", "-lcarillon")
         self.hear_the_bar("./fall_unreal")
 
     def run_python(self, page, number=0):
         """Runs a program of the page, and returns what it prints."""
-        name = self.save(page, "python", f"{page}.{number}.py", number)
-        done = subprocess.run(["/usr/bin/python3", name], cwd=self.folder, env=self.environment, check=False,
-                              capture_output=True, text=True)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        return done.stdout
+        return self.run_well("/usr/bin/python3", self.save(page, "python", f"{page}.{number}.py", number))
 
     def test_a_rod_on_steps_in_rapier(self):
         page = (ROOT / "docs/engines.md").read_text()
@@ -89,32 +85,25 @@ class RecipesTest(DaemonTest):
         for name in ("node/lib", "node/package.json", "adapters"):
             (package / name.split("/")[-1]).symlink_to(ROOT / "client_sdk" / name)
         places = (package.parent, os.environ["CARILLON_NODE_MODULES"], os.environ["CARILLON_ENGINE_MODULES"])
-        done = subprocess.run(["node", "rod.js"], cwd=self.folder, check=False, capture_output=True, text=True,
-                              env={**self.environment, "NODE_PATH": ":".join(map(str, places))})
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertRegex(done.stdout, r"blowCount: [1-9]")
+        self.assertRegex(self.run_well("node", "rod.js", path=places), r"blowCount: [1-9]")
         self.assertGreater(numpy.abs(sound.read_wave(self.folder / "rod.wav")).max(), 1e-4)
 
     def test_mcap(self):
         self.save("recipe_mcap.md", "js", "mcap.js")
-        with carillon.connect(self.daemon.server) as c:
-            bar = c.create_model(self.folder / "bar.obj", material="brass")
-            bar.wait_for_transfer()
-            trace = carillon.Trace(1 / 240)
-            handle = trace.add(bar)
-            trace.step(0.25, impacts=carillon.Impacts(handle, (0.1, 0.015, 0.008), (0, 0, -0.02), durations=0.0005))
-            trace.write(self.folder / "drop.contacts")
-            heard = c.render(trace)
+        bar = self.c.create_model(self.folder / "bar.obj", material="brass")
+        bar.wait_for_transfer()
+        trace = carillon.Trace(1 / 240)
+        handle = trace.add(bar)
+        trace.step(0.25, impacts=carillon.Impacts(handle, (0.1, 0.015, 0.008), (0, 0, -0.02), durations=0.0005))
+        trace.write(self.folder / "drop.contacts")
+        heard = self.c.render(trace)
         modules = self.folder / "mcap_modules"
         modules.mkdir()
         (modules / "carillon").symlink_to(ROOT / "client_sdk/node")
-        environment = {**self.environment, "NODE_PATH": f"{modules}:{os.environ['CARILLON_NODE_MODULES']}"}
-        reader = pathlib.Path(__file__).with_name("read_mcap.js")
-        for words in (["mcap.js", "drop.contacts", "drop.mcap", "1764417600"], [reader, "drop.mcap"]):
-            done = subprocess.run(["node", *words], cwd=self.folder, env=environment, check=False,
-                                  capture_output=True, text=True)
-            self.assertEqual((done.returncode, done.stderr), (0, ""))
-        messages = json.loads(done.stdout)
+        path = (modules, os.environ["CARILLON_NODE_MODULES"])
+        self.run_well("node", "mcap.js", "drop.contacts", "drop.mcap", "1764417600", path=path)
+        messages = json.loads(self.run_well("node", pathlib.Path(__file__).with_name("read_mcap.js"), "drop.mcap",
+                                            path=path))
         audio = [message for message in messages if message["topic"] == "/sound"]
         (impact,) = (message for message in messages if message["topic"] == "/impacts")
         self.assertEqual({message["schema"] for message in audio}, {"foxglove.RawAudio"})
@@ -151,11 +140,10 @@ class RecipesTest(DaemonTest):
         printed = self.run_python("recipe_sampler.md", number=1)
         self.assertLess(float(re.fullmatch(r"left over: (-\d+) dB\n", printed)[1]), -40)
         table = numpy.genfromtxt(self.folder / "bar.csv", delimiter=",", names=True)
-        with carillon.connect(self.daemon.server) as c:
-            (bar,) = (model for model in c.models() if model.material.preset == "brass")
-            strike = {"point": (0.1, 0.015, 0.008), "impulse": (0, 0, -0.2), "duration": 0.0005, "seconds": 0.3}
-            gain = 0.1 / bar.render_strike(**strike, gain=0.01).peak * 0.01
-            struck = bar.render_strike(**strike, gain=gain)
+        (bar,) = (model for model in self.c.models() if model.material.preset == "brass")
+        strike = {"point": (0.1, 0.015, 0.008), "impulse": (0, 0, -0.2), "duration": 0.0005, "seconds": 0.3}
+        gain = 0.1 / bar.render_strike(**strike, gain=0.01).peak * 0.01
+        struck = bar.render_strike(**strike, gain=gain)
         heard_pa = struck.mono * struck.summary.peak_pa / struck.peak / gain
         times_s = (numpy.arange(len(heard_pa)) - numpy.flatnonzero(heard_pa)[0])[:, numpy.newaxis] / 48000
         waves = numpy.cos(2 * numpy.pi * table["frequency_hz"] * times_s + table["phase_rad"])
@@ -173,13 +161,12 @@ class RecipesTest(DaemonTest):
         harmonics[[0, 2, 3, 6, 7, 8]] = 1, z, x, (3 * z**2 - 1) / 2, 3**0.5 * x * z, 0.75**0.5 * x**2
         harmonics[[12, 13]] = (5 * z**3 - 3 * z) / 2, (3 / 8)**0.5 * x * (5 * z**2 - 1)
         harmonics[[14, 15]] = (15 / 4)**0.5 * x**2 * z, (5 / 8)**0.5 * x**3
-        with carillon.connect(self.daemon.server) as c:
-            (bar,) = (model for model in c.models() if model.material.preset == "brass")
-            with c.perform(step=0.02, microphones=[carillon.Omni(at=[100 * axis for axis in direction])],
-                           hearing={"directivity": True, "distance_gain": False}) as heard:
-                handle = heard.add(bar)
-                strike = carillon.Impacts([handle], [(0.1, 0.015, 0.008)], [(0, 0, -0.02)])
-                steps = [heard.step(impacts=strike if step == 5 else None)[0] for step in range(55)]
+        (bar,) = (model for model in self.c.models() if model.material.preset == "brass")
+        with self.c.perform(step=0.02, microphones=[carillon.Omni(at=[100 * axis for axis in direction])],
+                            hearing={"directivity": True, "distance_gain": False}) as heard:
+            handle = heard.add(bar)
+            strike = carillon.Impacts([handle], [(0.1, 0.015, 0.008)], [(0, 0, -0.02)])
+            steps = [heard.step(impacts=strike if step == 5 else None)[0] for step in range(55)]
         pressure_pa = numpy.concatenate(steps, axis=2)[0, 0, 5 * 960:]
         difference_pa = harmonics @ channels - pressure_pa
 
@@ -199,7 +186,3 @@ class RecipesTest(DaemonTest):
         self.assertLess(float(cracked_s), 0.5 * float(whole_s))
         for name in (whole, cracked):
             self.assertGreater(numpy.abs(sound.read_wave(self.folder / f"{name}.wav")).max(), 1e-3)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,33 +2,25 @@
 """`carillon doctor` where a part of the daemon does not serve, or nothing is heard."""
 
 import json
-import pathlib
 import re
 import shutil
-import tempfile
-import time
-import unittest
 
 import carillon
-from daemon import ROOT, Daemon
+from daemon import ROOT, ScratchTest, wait_until
 
 
-class HealthTest(unittest.TestCase):
+class HealthTest(ScratchTest):
     MODELS = "carillon.v1.ModalModelService"
     DECOMPOSITIONS = "carillon.v1.DecompositionService"
 
     def setUp(self):
-        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-")))
+        super().setUp()
         self.precompute = self.folder / "precompute"
         shutil.copy("/bin/true", self.precompute)
-        self.daemon = Daemon(self.folder, "--precompute", self.precompute)
-        self.addCleanup(self.daemon.stop)
+        self.serve("--precompute", self.precompute)
 
-    def wait_until_not_serving(self, service):
-        end_s = time.monotonic() + 30
-        while self.daemon.health(service) != "NOT_SERVING":
-            self.assertLess(time.monotonic(), end_s, service)
-            time.sleep(0.05)
+    def wait_until_it_is(self, health, service):
+        wait_until(lambda: self.daemon.health(service) == health)
 
     def findings(self, verdict="FAULT"):
         """The texts of the doctor's findings with this verdict, by their subject."""
@@ -37,7 +29,7 @@ class HealthTest(unittest.TestCase):
 
     def test_it_finds_a_program_of_decompositions_that_is_gone(self):
         self.precompute.unlink()
-        self.wait_until_not_serving(self.DECOMPOSITIONS)
+        self.wait_until_it_is("NOT_SERVING", self.DECOMPOSITIONS)
         found = self.daemon.command("doctor", check=False)
         self.assertEqual(found.returncode, 1)
         self.assertRegex(found.stdout, rf"(?m)^FAULT +{self.DECOMPOSITIONS} +is NOT_SERVING: .*carillon-precompute")
@@ -48,22 +40,19 @@ class HealthTest(unittest.TestCase):
         work = self.folder / "data/work"
         work.rmdir()
         work.write_text("not a folder")
-        self.wait_until_not_serving(self.DECOMPOSITIONS)
+        self.wait_until_it_is("NOT_SERVING", self.DECOMPOSITIONS)
         self.assertRegex(self.findings()[self.DECOMPOSITIONS], "^is NOT_SERVING: .*folder work")
-        self.assertRegex((self.folder / "log").read_text(), "decompositions_impossible error=.WORK_FOLDER_UNUSABLE: "
+        self.assertRegex(self.daemon.log(), "decompositions_impossible error=.WORK_FOLDER_UNUSABLE: "
                          f"{work}, .*remove the file in place of the folder")
         work.unlink()
-        end_s = time.monotonic() + 30
-        while self.daemon.health(self.DECOMPOSITIONS) != "SERVING":
-            self.assertLess(time.monotonic(), end_s)
-            time.sleep(0.05)
+        self.wait_until_it_is("SERVING", self.DECOMPOSITIONS)
 
     def test_it_finds_why_nothing_is_heard_and_says_what_the_page_says(self):
         self.assertEqual(self.findings("NOTE"), {})
         self.daemon.command("volume", "--mute")
         with carillon.connect(self.daemon.server) as c, c.scene() as heard, c.scene() as other:
             heard.update(solo=True)
-            told = json.loads(self.daemon.command("doctor", "--json").stdout)["findings"]
+            told = self.daemon.json("doctor")["findings"]
         notes = {found["id"]: found for found in told if found["verdict"] == "NOTE"}
         self.assertEqual({name: found["subject"] for name, found in notes.items()},
                          {"OUTPUT_MUTED": "sound", "SCENE_MUTED": other.name})
@@ -71,14 +60,10 @@ class HealthTest(unittest.TestCase):
         for name, found in notes.items():
             meaning, repair = re.search(rf"(?m)^\| {name} \| (.*) \| (.*) \|$", page).groups()
             self.assertTrue(found["text"].endswith(f": {meaning}; {repair}"), found["text"])
-            explained = json.loads(self.daemon.command("--json", "explain", name).stdout)
+            explained = self.daemon.json("explain", name)
             self.assertEqual((explained["meaning"], explained["repair"]), (meaning, repair))
 
     def test_it_finds_a_database_that_was_moved_away(self):
         (self.folder / "data/carillon.db").rename(self.folder / "data/away.db")
-        self.wait_until_not_serving(self.MODELS)
+        self.wait_until_it_is("NOT_SERVING", self.MODELS)
         self.assertEqual(set(self.findings()), {self.MODELS, self.DECOMPOSITIONS})
-
-
-if __name__ == "__main__":
-    unittest.main()

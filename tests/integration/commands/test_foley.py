@@ -2,14 +2,13 @@
 """`carillon foley`: a bar that falls flat on a floor and bounces once is heard when it lands, from a table of poses and
 from a glTF; what is no motion, or not explained by contacts, is refused by name."""
 
-import json
 import re
-import struct
-import unittest
 
 import numpy
 
 import carillon
+import gltf
+import meshes
 import sound
 from daemon import BIN, DaemonTest
 
@@ -21,14 +20,6 @@ LANDS_S = FIRST_S + (2 * HEIGHT_M / GRAVITY) ** 0.5
 SPEED_M_PER_S = (2 * GRAVITY * HEIGHT_M) ** 0.5
 IMPULSE_N_S = MASS_KG * SPEED_M_PER_S * (1 + RESTITUTION)
 
-BOX = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
-       (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]
-
-
-def box(sides):
-    """Corners about the centre, and triangles."""
-    return numpy.array([[side * ((i >> axis & 1) - 0.5) for axis, side in enumerate(sides)] for i in range(8)]), BOX
-
 
 def heights():
     """Times of the frames, and the height of the bar's centre."""
@@ -39,32 +30,18 @@ def heights():
     return times, height + SIDES_M[2] / 2
 
 
-def write_obj(path, vertices, triangles):
-    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in vertices)
-                    + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles))
-
-
 def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel", drawn=SIDES_M,
                collider=None, scale=(1, 1, 1), interpolation="LINEAR", flips=False, later_s=0,
                inward=False):
     """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z. With `flips` the
     quaternion of the bar, which does not turn, changes its sign at each key."""
-    blob, views, accessors = b"", [], []
-
-    def accessor(array, kind, component):
-        nonlocal blob
-        data = numpy.ascontiguousarray(array, dtype="<f4" if component == 5126 else "<u2").tobytes()
-        views.append({"buffer": 0, "byteOffset": len(blob), "byteLength": len(data)})
-        blob += data + b"\0" * (-len(data) % 4)
-        accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind})
-        return len(accessors) - 1
+    writer = gltf.Writer()
 
     def mesh(sides, named):
-        vertices, triangles = box(sides)
-        corners = vertices[numpy.array(triangles).ravel()]  # a corner for each triangle, as exporters write them
+        vertices, triangles = map(numpy.array, meshes.centred_box(sides))
+        corners = vertices[triangles.ravel()]  # a corner for each triangle, as exporters write them
         corners = corners[::-1] if inward else corners
-        primitive = {"attributes": {"POSITION": accessor(corners, "VEC3", 5126)}, "material": named}
-        return {"primitives": [primitive]}
+        return {"primitives": [{"attributes": {"POSITION": writer.add(corners)}, "material": named}]}
 
     times, height = heights()
     half = 0.5**0.5
@@ -73,8 +50,8 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
         values = numpy.array(values, float)[keys]
         if interpolation == "CUBICSPLINE":  # a tangent before and after each value
             values = numpy.stack([0 * values, values, 0 * values], 1).reshape(-1, values.shape[1])
-        return {"samplers": [{"input": accessor(times[keys] + later_s, "SCALAR", 5126), "interpolation": interpolation,
-                              "output": accessor(values, f"VEC{values.shape[1]}", 5126)}],
+        return {"samplers": [{"input": writer.add(times[keys] + later_s), "interpolation": interpolation,
+                              "output": writer.add(values)}],
                 "channels": [{"sampler": 0, "target": {"node": 1, "path": path}}]}
 
     bar = {"name": "Bar", "mesh": 0, "translation": [0, 0, 0], "scale": list(scale)}
@@ -85,7 +62,7 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
     if collider:
         bar["extensions"]["KHR_physics_rigid_bodies"]["collider"] = {"geometry": {"mesh": 2},
                                                                      "extras": {"rounding": collider[1]}}
-    gltf = {
+    document = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
         "materials": [{"name": material}, {"name": "Ground"}],
         "meshes": [mesh(drawn / numpy.abs(scale), 0), mesh((4, 0.2, 4), 1)],
@@ -96,16 +73,12 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
         "animations": [animation("translation", [(0, 0, z) for z in height])]
         + [animation("rotation", [(0, 0, 0, (-1) ** k) for k in range(len(times))])] * flips,
-        "bufferViews": views, "accessors": accessors}
+        "bufferViews": writer.views, "accessors": writer.accessors}
     if collider:
-        gltf["meshes"].append(mesh(collider[0], 0))
+        document["meshes"].append(mesh(collider[0], 0))
     if skin:
-        gltf["skins"] = [{"joints": [2]}]
-    gltf["buffers"] = [{"byteLength": len(blob)}]
-    text = json.dumps(gltf).encode()
-    text += b" " * (-len(text) % 4)
-    path.write_bytes(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(blob), len(text), 0x4E4F534A) + text
-                     + struct.pack("<II", len(blob), 0x004E4942) + blob)
+        document["skins"] = [{"joints": [2]}]
+    gltf.write_binary(path, document, writer.buffer)
 
 
 def impacts(path):
@@ -119,22 +92,33 @@ class FoleyTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        write_obj(cls.folder / "bar.obj", *box(SIDES_M))
+        cls.write_box("bar.obj")
         times, height = heights()
-        rows = "".join(f"{t:.9g},Bar,0,0,{z:.9g},1,0,0,0\n" for t, z in zip(times, height))
-        (cls.folder / "fall.csv").write_text("t,body,x,y,z,qw,qx,qy,qz\n" + rows)
+        cls.rows = [(f"{t:.9g}", "Bar", 0, 0, f"{z:.9g}", 1, 0, 0, 0) for t, z in zip(times, height)]
+        cls.write_poses("fall.csv", cls.rows)
         count = len(times)
         numpy.savez(cls.folder / "fall.npz", times=times, bodies=numpy.array(["Bar"]),
                     positions=numpy.stack([numpy.zeros(count), numpy.zeros(count), height], 1)[:, None],
                     orientations=numpy.tile([1.0, 0, 0, 0], (count, 1, 1)))
         write_gltf(cls.folder / "fall.glb")
 
+    @classmethod
+    def write_box(cls, name, sides=SIDES_M, faces=slice(None)):
+        vertices, triangles = meshes.centred_box(sides)
+        (cls.folder / name).write_bytes(meshes.obj(vertices, triangles[faces]))
+
+    @classmethod
+    def write_poses(cls, name, rows, columns="t,body,x,y,z,qw,qx,qy,qz", separator=",", start="", end="\n"):
+        lines = [*([columns] if columns else []), *(",".join(map(str, row)) for row in rows)]
+        text = start + "".join(line.replace(",", separator) + end for line in lines)
+        (cls.folder / name).write_bytes(text.encode())
+
     def foley(self, file, *words, check=True):
         return self.daemon.command("foley", self.folder / file, *words, check=check)
 
-    def table(self, file, *words, check=True):
-        return self.foley(file, "--mesh", f"Bar={self.folder / 'bar.obj'}", "--material", "Bar=structural_steel",
-                          *words, check=check)
+    def table(self, file, *words, mesh="bar.obj", check=True):
+        return self.foley(file, "--mesh", f"Bar={self.folder / mesh}", "--material", "Bar=structural_steel", *words,
+                          check=check)
 
     def check_impacts(self, path, impulse=IMPULSE_N_S):
         found = impacts(path)
@@ -172,15 +156,8 @@ class FoleyTest(DaemonTest):
                 self.foley(f"{name}.glb", "--trace", trace)
                 self.check_impacts(trace)
 
-    def write_poses(self, name, rows, columns="t,body,x,y,z,qw,qx,qy,qz", separator=",", start="", end="\n"):
-        lines = [*([columns] if columns else []), *(",".join(map(str, row)) for row in rows)]
-        text = start + "".join(line.replace(",", separator) + end for line in lines)
-        (self.folder / name).write_bytes(text.encode())
-
     def test_a_table_has_its_columns_in_any_order_and_any_unit(self):
-        times, height = heights()
-        rows = [(f"{t:.9g}", "Bar", 0, 0, f"{z:.9g}", 1, 0, 0, 0) for t, z in zip(times, height)]
-        trace = self.folder / "columns.contacts"
+        rows, trace = self.rows, self.folder / "columns.contacts"
         last = [(k, name, qx, qy, qz, qw, x, y, z, t) for k, (t, name, x, y, z, qw, qx, qy, qz) in enumerate(rows)]
         self.write_poses("last.csv", last, "Frame,Body,QX,QY,QZ,QW,X,Y,Z,T", "; ", "\ufeff", "\r\n")
         self.table("last.csv", "--floor", 0, "--trace", trace)
@@ -190,10 +167,8 @@ class FoleyTest(DaemonTest):
         self.check_impacts(trace)
         milli = [(t, name, x, y, float(z) * 1000, *q) for t, name, x, y, z, *q in rows]
         self.write_poses("milli.csv", milli)
-        vertices, triangles = box(SIDES_M)
-        write_obj(self.folder / "milli.obj", vertices * 1000, triangles)
-        self.foley("milli.csv", "--unit", "mm", "--mesh", f"Bar={self.folder / 'milli.obj'}", "--material",
-                   "Bar=structural_steel", "--floor", 0, "--trace", trace)
+        self.write_box("milli.obj", [1000 * side for side in SIDES_M])
+        self.table("milli.csv", "--unit", "mm", "--floor", 0, "--trace", trace, mesh="milli.obj")
         self.check_impacts(trace)
 
     def test_a_table_with_gaps_is_refused_with_its_line(self):
@@ -205,13 +180,9 @@ class FoleyTest(DaemonTest):
             wrong = [*rows[:6], *instead, *rows[7:]]
             with self.subTest(name):
                 self.write_poses(f"{name}.csv", wrong)
-                done = self.table(f"{name}.csv", *out, check=False)
-                self.refused("MOTION_MALFORMED", done)
-                self.assertIn(f"line {line} ", done.stderr)
+                self.refused("MOTION_MALFORMED", self.table(f"{name}.csv", *out, check=False), f"line {line} ")
         self.write_poses("names.csv", rows, "time,body,x,y,z,qw,qx,qy,qz")
-        done = self.table("names.csv", *out, check=False)
-        self.refused("MOTION_MALFORMED", done)
-        self.assertIn("the column t ", done.stderr)
+        self.refused("MOTION_MALFORMED", self.table("names.csv", *out, check=False), "the column t ")
 
     def test_a_mass_of_the_file_scales_the_impulse(self):
         write_gltf(self.folder / "heavy.glb", mass=2 * MASS_KG)
@@ -239,11 +210,10 @@ class FoleyTest(DaemonTest):
         self.check_impacts(trace)
 
     def test_an_open_surface_is_repaired_where_it_is_asked_for(self):
-        vertices, triangles = box(SIDES_M)
-        write_obj(self.folder / "hole.obj", vertices, triangles[1:])
+        self.write_box("open.obj", faces=slice(1, None))
         out = self.folder / "hole.wav"
-        self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'hole.obj'}", "--material",
-                   "Bar=structural_steel", "--repair", "B*", "--out", out, "--tail", 0.1)
+        self.refused("SURFACE_OPEN", self.table("fall.csv", "--floor", 0, "--out", out, mesh="open.obj", check=False))
+        self.table("fall.csv", "--floor", 0, "--repair", "B*", "--out", out, "--tail", 0.1, mesh="open.obj")
         self.assertGreater(numpy.abs(sound.read_wave(out)).max(), 1e-4)
 
     def test_the_sound_begins_with_the_first_key(self):
@@ -263,10 +233,9 @@ class FoleyTest(DaemonTest):
         numpy.testing.assert_allclose(stem, whole, atol=1e-4)
 
     def test_a_body_too_small_to_be_heard_stays_silent_beside_others(self):
-        times, height = heights()
-        self.write_poses("two.csv", [(t, name, x, 0, z, 1, 0, 0, 0) for t, z in zip(times, height)
+        self.write_poses("two.csv", [(row[0], name, x, *row[3:]) for row in self.rows
                                      for name, x in (("Bar", 0), ("Die", 1))])
-        write_obj(self.folder / "die.obj", *box((0.012, 0.012, SIDES_M[2])))
+        self.write_box("die.obj", (0.012, 0.012, SIDES_M[2]))
         done = self.table("two.csv", "--floor", 0, "--mesh", f"Die={self.folder / 'die.obj'}", "--material",
                           "Die=structural_steel", "--trace", self.folder / "two.contacts")
         self.assertRegex(done.stderr, "(?m)^warning: Die: ")
@@ -278,41 +247,33 @@ class FoleyTest(DaemonTest):
                         r"Ground +fixed +silent", r"Camera +camera"):
             self.assertRegex(lines, pattern)
 
-    def refused(self, reason, done):
+    def refused(self, reason, done, words=""):
         self.assertEqual(done.returncode, 1)
-        self.assertIn(f"carillon: {reason}: ", done.stderr)
+        self.assertRegex(done.stderr, f"carillon: {reason}: .*{words}")
 
     def test_refusals_have_names(self):
         out = ("--trace", self.folder / "none.contacts")
         self.refused("MOTION_WITHOUT_CONTACT", self.table("fall.csv", *out, check=False))
         flight = [(k / 60, k / 90, 2 + k / 20 - 4.905 * (k / 60)**2) for k in range(30)]
-        rows = "".join(f"{time:.9g},Bar,{x:.9g},0,{z:.9g},1,0,0,0\n" for time, x, z in flight)
-        (self.folder / "flight.csv").write_text(rows)
+        self.write_poses("flight.csv", [(time, "Bar", x, 0, z, 1, 0, 0, 0) for time, x, z in flight])
         flight = self.table("flight.csv", "--floor", 0, *out, check=False)
         self.refused("MOTION_WITHOUT_CONTACT", flight)
         self.assertLess(float(re.search(r"unexplained (\S+) %", flight.stderr)[1]), 0.1)
-        rows = "".join(f"{k / 60},Bar,{max(0, k - 20) * 0.05},0,{SIDES_M[2] / 2},1,0,0,0\n" for k in range(40))
-        (self.folder / "pushed.csv").write_text(rows)  # by a hand that the file does not have
+        # By a hand that the file does not have.
+        self.write_poses("pushed.csv", [(k / 60, "Bar", max(0, k - 20) * 0.05, 0, SIDES_M[2] / 2, 1, 0, 0, 0)
+                                        for k in range(40)])
         self.refused("MOTION_UNEXPLAINED", self.table("pushed.csv", "--floor", 0, *out, check=False))
         self.refused("BODY_UNKNOWN", self.foley("fall.glb", "--material", "Cup=oak", *out, check=False))
         self.refused("BODY_UNKNOWN", self.foley("fall.csv", *out, check=False))
-        write_gltf(self.folder / "thin.glb", keys=numpy.r_[0:10, 13, 14, 17:25])
-        self.refused("MOTION_TOO_COARSE", self.foley("thin.glb", *out, check=False))
-        write_gltf(self.folder / "still.glb", keys=slice(0, 1))
-        self.refused("NO_MOTION", self.foley("still.glb", *out, check=False))
+        for reason, form in (("MOTION_TOO_COARSE", {"keys": numpy.r_[0:10, 13, 14, 17:25]}),
+                             ("NO_MOTION", {"keys": slice(0, 1)}), ("MOTION_MALFORMED", {"skin": True})):
+            write_gltf(self.folder / "wrong.glb", **form)
+            self.refused(reason, self.foley("wrong.glb", *out, check=False))
         (self.folder / "film.blend").write_bytes(b"BLENDER-v304REND" + bytes(100))
         self.refused("MOTION_MALFORMED", self.foley("film.blend", *out, check=False))
-        write_gltf(self.folder / "skin.glb", skin=True)
-        self.refused("MOTION_MALFORMED", self.foley("skin.glb", *out, check=False))
-        vertices, triangles = box(SIDES_M)
-        write_obj(self.folder / "open.obj", vertices, triangles[1:])
-        self.refused("SURFACE_OPEN", self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'open.obj'}",
-                                                "--material", "Bar=structural_steel", *out, check=False))
-        write_obj(self.folder / "small.obj", *box((0.012, 0.012, SIDES_M[2])))
-        silent = self.foley("fall.csv", "--floor", 0, "--mesh", f"Bar={self.folder / 'small.obj'}", "--material",
-                            "Bar=structural_steel", *out, check=False)
-        self.refused("NO_MODE_IN_BAND", silent)
-        self.assertIn("carillon: NO_MODE_IN_BAND: Bar: ", silent.stderr)
+        self.write_box("small.obj", (0.012, 0.012, SIDES_M[2]))
+        self.refused("NO_MODE_IN_BAND", self.table("fall.csv", "--floor", 0, *out, mesh="small.obj", check=False),
+                     "Bar: ")
         self.assertFalse((self.folder / "none.contacts").exists())
         self.table("fall.csv", "--force", *out)
         self.assertEqual(impacts(self.folder / "none.contacts"), [])
@@ -320,7 +281,7 @@ class FoleyTest(DaemonTest):
     def python_contacts(self, **options):
         times, height = heights()
         return carillon.motion.contacts(
-            {"Bar": carillon.motion.Body(box(SIDES_M), "structural_steel")}, times,
+            {"Bar": carillon.motion.Body(meshes.centred_box(SIDES_M), "structural_steel")}, times,
             {"Bar": ([(0, 0, z) for z in height], [(1, 0, 0, 0)] * len(times))},
             server=self.daemon.server, program=str(BIN / "carillon"), **options)
 
@@ -329,10 +290,5 @@ class FoleyTest(DaemonTest):
         found.trace.write(self.folder / "python.contacts")
         self.check_impacts(self.folder / "python.contacts")
         self.assertLess(found.unexplained, 1e-6)
-        with self.assertRaises(carillon.CarillonError) as refused:
+        with self.assert_refused("MOTION_WITHOUT_CONTACT"):
             self.python_contacts()
-        self.assertEqual(refused.exception.reason, "MOTION_WITHOUT_CONTACT")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,8 +2,6 @@
 """`carillon material fit` and carillon.fit: the material of a plate is found from the sound that the daemon itself
 renders of it, with its residual and its picture."""
 
-import unittest
-
 import matplotlib
 import numpy
 
@@ -72,65 +70,34 @@ class Material(DaemonTest):
 
     def test_changed_recordings_are_cautioned_against(self):
         rate_hz, rng = 48000, numpy.random.default_rng(4)
-        taps, gated, clipped = [], [], []
+        found = {name: [] for name in ("noisy", "gated", "clipped")}
         for number, tap in enumerate(self.taps):
             samples = numpy.concatenate([numpy.zeros((rate_hz // 2, 1)), carillon.Sound.load(tap).samples[:, :1]])
             samples += 2e-4 * rng.standard_normal(samples.shape)
             quiet = samples.copy()
             quiet[rate_hz // 2 + rate_hz:] = 0
-            for files, changed, name in ((taps, samples, "noisy"), (gated, quiet, "gated"),
-                                         (clipped, numpy.clip(8 * samples, -0.99, 0.99), "clipped")):
-                files.append(self.folder / f"{name}{number}.wav")
-                carillon.Sound(changed.astype(numpy.float32), rate_hz).save(files[-1])
-        program = self.own["program"]
-        plain = carillon.fit.extract(taps, program=program)
+            for name, changed in zip(found, (samples, quiet, numpy.clip(8 * samples, -0.99, 0.99))):
+                found[name].append(self.folder / f"{name}{number}.wav")
+                carillon.Sound(changed.astype(numpy.float32), rate_hz).save(found[name][-1])
+        plain, gated, clipped = (carillon.fit.extract(taps, program=self.own["program"]) for taps in found.values())
         self.assertEqual((plain.gain_fall_db, plain.clipped_s), (0, 0))
-        self.assertGreater(carillon.fit.extract(gated, program=program).gain_fall_db, 30)
-        self.assertGreater(carillon.fit.extract(clipped[0], program=program).clipped_s, 0.01)
+        self.assertGreater(gated.gain_fall_db, 30)
+        self.assertGreater(clipped.clipped_s, 0.01)
 
     def test_a_named_material_needs_no_caution(self):
         mesh, table = self.folder / "bar.obj", self.folder / "bar.csv"
         mesh.write_bytes(meshes.obj(*meshes.box((0.25, 0.032, 0.008))))
-        with carillon.connect(self.daemon.server) as client:
-            bar = client.create_model(mesh, material="brass", without_transfer=True)
-            table.write_text("".join(f"{hz}\n" for hz in bar.frequencies()[:12]))
+        bar = self.c.create_model(mesh, material="brass", without_transfer=True)
+        table.write_text("".join(f"{hz}\n" for hz in bar.frequencies()[:12]))
         found = carillon.fit.material(bar.name, table, density=8500, **self.own)
         self.assertAlmostEqual(found.poisson_ratio, 0.35, delta=0.03)
         self.assertEqual((found.nearest_material, found.cautions), ("brass", []))
 
-    def test_an_object_of_a_poisson_ratio_nearby_sounds_as_if_it_were_decomposed_for_it(self):
-        mesh = self.folder / "thin.obj"
-        mesh.write_bytes(meshes.obj(*meshes.box((0.12, 0.08, 0.004))))
-        figures = ("--young", YOUNG_PA, "--density", DENSITY, "--loss-factor", LOSS, "--poisson")
-
-        def create(nu):
-            self.daemon.command("model", "create", mesh, "--wait", "--without-transfer", "--label", f"thin{nu}",
-                                *figures, nu)
-
-        def apart(nu):
-            """How far the first ten modes for 0.3 are from lines of the other model's sound, relative."""
-            sound = self.folder / f"thin_{nu}.wav"
-            self.daemon.command("strike", "thin0.28", *figures, nu, "--point", "0.11,0.07,0.004", "--impulse",
-                                "0,0,-0.002", "--duration", 2e-5, "--seconds", 1.5, "--normalize", "--out", sound)
-            lines = [line.frequency_hz for line in carillon.fit.extract([sound], program=self.own["program"]).lines]
-            return max(min(abs(line / mode - 1) for line in lines) for mode in decomposed)
-
-        create(0.3)
-        create(0.28)
-        with carillon.connect(self.daemon.server) as client:
-            of_model, = (model for model in client.models() if model.label == "thin0.3")
-            decomposed = of_model.frequencies()[:10]
-        self.assertEqual(len(decomposed), 10)
-        self.assertLess(apart(0.3), 1e-3)
-        self.assertGreater(apart(0.28), 4e-3)
-
     def test_the_material_file_makes_a_model_that_sounds_as_recorded(self):
-        with carillon.connect(self.daemon.server) as client:
-            again = client.create_model(str(self.folder / "plate.obj"), material=self.found.material, label="again",
-                                        max_frequency_hz=9000, accuracy=0.005)
-            true = [model for model in client.models() if model.label == "true"][0]
-            least = min(again.mode_count, 6)
-            ratio = numpy.array(again.frequencies()[:least]) / numpy.array(true.frequencies()[:least])
+        again = self.c.create_model(self.folder / "plate.obj", material=self.found.material, label="again",
+                                    max_frequency_hz=9000, accuracy=0.005)
+        least = min(again.mode_count, 6)
+        ratio = again.frequencies()[:least] / self.c.model("true").frequencies()[:least]
         self.assertLess(abs(ratio - 1).max(), 0.005)
 
     def test_the_picture_has_each_line_and_mode_once(self):
@@ -152,15 +119,10 @@ class Material(DaemonTest):
         self.assertAlmostEqual(found.laws[0]["loss_factor"][0]["loss_factor"] / LOSS, 1, delta=0.1)
         for text in ("468,4\n1284,5\n", "468,4;10\n", "frequency_hz,t60\n468,10\n", "468.4;10\n"):
             table.write_text(text)
-            with self.assertRaises(carillon.CarillonError) as refused:
+            with self.subTest(text), self.assert_refused("RECORDING_UNREADABLE"):
                 carillon.fit.material("plate", table, density=DENSITY, **self.own)
-            self.assertEqual(refused.exception.reason, "RECORDING_UNREADABLE", text)
         noise = numpy.random.default_rng(1).standard_normal((48000, 1)).astype(numpy.float32) * 0.1
         carillon.Sound(noise, 48000).save(self.folder / "noise.wav")
         with self.assertRaises(carillon.CarillonError) as refused:
             carillon.fit.material("plate", [self.folder / "noise.wav"], density=DENSITY, **self.own)
         self.assertIn(refused.exception.reason, ("TOO_FEW_MODES", "RECORDING_TOO_NOISY"))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -7,13 +7,11 @@ import pathlib
 import re
 import shlex
 import subprocess
-import tempfile
-import unittest
 
 import carillon
 import numpy
 import sound
-from daemon import BIN, ROOT, Daemon
+from daemon import BIN, ROOT, ScratchTest
 
 BLOCK = re.compile(r"(?ms)^ *```sh\n(.*?)^ *```|^((?:    [^\n]*\n)+)")
 FENCED = re.compile(r"(?ms)^```.*?^```|^    [^\n]*$")
@@ -48,14 +46,14 @@ def commands():
                         for call in WORDS.findall(FENCED.sub("", page.read_text())))
 
 
-class PagesTest(unittest.TestCase):
+class PagesTest(ScratchTest):
     def setUp(self):
-        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="carillon-"))
-        pathlib.Path(self.folder, "traces").mkdir()  # clips.md has it
-        self.environment = {**os.environ, "CARILLON_SERVER": "unix:/nowhere", "HOME": self.folder}
+        super().setUp()
+        (self.folder / "traces").mkdir()  # clips.md has it
+        self.environment = {**os.environ, "CARILLON_SERVER": "unix:/nowhere", "HOME": str(self.folder)}
 
     def run_command(self, command):
-        program, *words = shlex.split(PLACES.sub(self.folder, command))
+        program, *words = shlex.split(PLACES.sub(str(self.folder), command))
         if program == "carillond" and "db" not in words:
             words.insert(0, "--check-config")
         if words[:1] == ["console"]:
@@ -83,18 +81,14 @@ class PagesTest(unittest.TestCase):
                     self.assertTrue(any(any(ROOT.glob(place.format(word))) for place in places))
 
     def test_the_first_pages_are_heard_as_printed(self):
-        daemon = Daemon(self.folder)
-        self.addCleanup(daemon.stop)
-        environment = {**self.environment, "CARILLON_SERVER": daemon.server, "PATH": f"{BIN}:{os.environ['PATH']}"}
-        with carillon.connect(daemon.server) as c, c.recording() as heard:
+        self.serve()
+        server = self.daemon.server
+        environment = {**self.environment, "CARILLON_SERVER": server, "PATH": f"{BIN}:{os.environ['PATH']}"}
+        with carillon.connect(server) as c, c.recording() as heard:
             for page in ("README.md", "docs/sounds/README.md"):
                 block = next(text for text in blocks(ROOT / page) if "carillon strike" in text)
                 subprocess.run(["bash", "-euc", block], cwd=self.folder, env=environment, check=True)
             heard.take(0.5)
         self.assertAlmostEqual(heard.sound.loudest_frequency_hz(), BELL_HZ, delta=BELL_HZ / 100)
-        self.assertAlmostEqual(numpy.abs(sound.read_wave(pathlib.Path(self.folder, "bell_steel.wav"))).max(), 1,
+        self.assertAlmostEqual(numpy.abs(sound.read_wave(self.folder / "bell_steel.wav")).max(), 1,
                                delta=0.2)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,9 +2,7 @@
 """`carillon model tune`: a bar gets its pitch by its size, its length or its thickness, and the model that is stored
 has it; free and clamped bars follow the theory of beams."""
 
-import json
 import math
-import unittest
 
 import meshes
 from daemon import DaemonTest
@@ -23,18 +21,13 @@ class Tune(DaemonTest):
         cls.daemon.command("model", "create", cls.mesh, "--wait", "--without-transfer", "--band", "20:4000", *STEEL)
 
     def tune(self, model, *options):
-        return json.loads(self.daemon.command("--json", "model", "tune", model, *options).stdout)
-
-    def refusal(self, *options):
-        done = self.daemon.command("model", "tune", *options, check=False)
-        self.assertEqual(done.returncode, 1)
-        return done.stderr.splitlines()[-1].split(":")[1].strip()
+        return self.daemon.json("model", "tune", model, *options)
 
     def modes(self, model):
-        return json.loads(self.daemon.command("--json", "model", "show", model).stdout)["frequencies_hz"]
+        return self.daemon.json("model", "show", model)["frequencies_hz"]
 
     def models(self):
-        return json.loads(self.daemon.command("--json", "model", "list").stdout)["modal_models"]
+        return self.daemon.json("model", "list")["modal_models"]
 
     def test_size_is_the_ratio_of_the_frequencies(self):
         base = self.modes("bar")
@@ -65,11 +58,7 @@ class Tune(DaemonTest):
 
     def test_a_length_that_does_nothing_is_refused(self):
         count = len(self.models())
-        self.assertEqual(self.refusal("bar", "--to", "A4", "--by", "y"), "PITCH_NOT_REACHED")
-        self.assertEqual(self.refusal("bar", "--to", 1, "--by", "length"), "PITCH_NOT_REACHED")
-        self.assertEqual(self.refusal("bar", "--to", "A4", "--mode", 99), "INVALID_SETTINGS")
+        for reason, *options in (("PITCH_NOT_REACHED", "A4", "--by", "y"), ("PITCH_NOT_REACHED", 1, "--by", "length"),
+                                 ("INVALID_SETTINGS", "A4", "--mode", 99)):
+            self.assertEqual(self.daemon.refusal("model", "tune", "bar", "--to", *options), reason)
         self.assertEqual(len(self.models()), count)
-
-
-if __name__ == "__main__":
-    unittest.main()
