@@ -120,10 +120,8 @@ def tune(folder, note, length, ideal_hz, options):
 
 def compute(options, folder):
     """What the page is filled with, and whether all is as it must be."""
-    import bunny_responses
     import errata
     import figures
-    import mode_shapes
     import rows as paper
     import sound_models
     solver = paper.Solver(options.build, folder)
@@ -134,8 +132,8 @@ def compute(options, folder):
     errors = errata.table(rows, best, (table2.CHIMES["D3"][2], found["D3"]))
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
-    mode_shapes.figure3(folder, rows["bowl 1"], best["bowl 1"], pictures / "figure3.png")
-    responses = bunny_responses.figure4(folder, rows["bunny (ceramic)"], pictures / "figure4.png")
+    figures.figure3(folder, rows["bowl 1"], best["bowl 1"], pictures / "figure3.png")
+    responses = figures.figure4(folder, rows["bunny (ceramic)"], pictures / "figure4.png")
     peaks = figures.figure5(rows, folder, pictures / "figure5.png")
     sounds = sound_models.compare(solver, rows, pictures / "sound_models.png", options.build / "paper")
     tables = {"frequencies": frequency_table(rows.values(), linear, best), "decays": decay_table(rows.values(), best),

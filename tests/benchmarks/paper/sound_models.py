@@ -7,7 +7,7 @@ import pathlib
 
 import bench
 import catalogue
-import mode_shapes
+import figures
 import numpy
 import programs
 from bench import head, row as line
@@ -54,7 +54,7 @@ def sounds(solver, case, row):
     """{name of the variant: pressure at 1 m in Pa}. Decomposes the body with its modes to HIGHEST_HZ."""
     name = f"{row.name}, sound"
     solver.solve(row.fine(), name, [*row.options, "--band", f"20:{HIGHEST_HZ}", *row.material.options()])
-    vertices = mode_shapes.arrays_of(solver.folder, name)["vertices"]
+    vertices = figures.arrays_of(solver.folder, name)["vertices"]
     made = {}
     with programs.studio() as studio:
         model = studio.import_model(solver.folder / f"{name}.model")
