@@ -11,8 +11,6 @@
 #include <vector>
 
 #include "server/synthesis/mixer.h"
-#include "tests/benchmarks/mixer/measured_time.h"
-#include "tests/benchmarks/mixer/population.h"
 #include "tests/benchmarks/mixer/programs.h"
 #include "tests/server/synthesis/closed_form.h"
 #include "tests/server/synthesis/voice/sphere_head.h"

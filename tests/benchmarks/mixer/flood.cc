@@ -16,7 +16,6 @@
 
 #include "server/base/clock.h"
 #include "server/synthesis/mixer.h"
-#include "tests/benchmarks/mixer/measured_time.h"
 #include "tests/benchmarks/mixer/programs.h"
 #include "tests/server/synthesis/closed_form.h"
 

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "client_sdk/cli/options/quantity.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+
+#include "client_sdk/cli/commands/material_figures.h"
 
 namespace carillon::cli {
 namespace {
@@ -46,6 +49,22 @@ TEST(Quantity, APitchIsANoteOrHertz) {
   EXPECT_EQ(ParsePitch("587.33"), 587.33);
   for (const char* text : {"", "A", "H4", " A4", "A##4", "A4x", "-440", "0", "nan", "A99"}) {
     EXPECT_FALSE(ParsePitch(text)) << text;
+  }
+}
+
+TEST(MaterialFigures, ALossFactorIsOneNumberOrATable) {
+  MaterialFigures figures;
+  figures.loss_factor = "0.002";
+  ASSERT_EQ(ToMaterial(figures)->loss_factor_size(), 1);
+  EXPECT_EQ(ToMaterial(figures)->loss_factor(0).loss_factor(), 0.002);
+  figures.loss_factor = "100:0.001,1000:0.003";
+  ASSERT_EQ(ToMaterial(figures)->loss_factor_size(), 2);
+  EXPECT_EQ(ToMaterial(figures)->loss_factor(1).frequency_hz(), 1000);
+  EXPECT_EQ(ToMaterial(figures)->loss_factor(1).loss_factor(), 0.003);
+  for (const char* wrong : {"much", "100:", "0.1,0.2", "100:0.001,"}) {
+    figures.loss_factor = wrong;
+    EXPECT_THAT(ToMaterial(figures).status().ToString(), testing::HasSubstr("INVALID_MATERIAL: "))
+        << wrong;
   }
 }
 

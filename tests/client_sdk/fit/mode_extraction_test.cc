@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client_sdk/fit/residual.h"
 #include "tests/client_sdk/fit/struck_body.h"
 
 namespace carillon::fit {
@@ -99,6 +100,22 @@ TEST(FindRings, ReadsNothingBeyondAFileThatBeginsAmidABlow) {
   ASSERT_EQ(rings.size(), 1U);
   EXPECT_EQ(rings[0].first_frame, kPiece);
   EXPECT_EQ(rings[0].samples.size(), kCount - kPiece);
+}
+
+TEST(ResidualOf, TakesTheModesOfAStrikeThatIsALittleOffTheOthers) {
+  const std::vector<TrueMode> modes = {{500, 1, 0.1}, {1310, 3, 0.1}, {2740, 6, 0.1}};
+  std::vector<TrueMode> higher = modes;
+  for (TrueMode& mode : higher) mode.frequency_hz *= 1.0002;
+  const std::vector<Ring> rings = FindRings({Struck(modes, 1e-5), Struck(higher, 1e-5)});
+  ASSERT_EQ(rings.size(), 2U);
+  const ExtractedModes found = ExtractModes(rings, [](double /*done*/) {});
+  for (size_t ring = 0; ring < rings.size(); ++ring) {
+    const Residual residual = ResidualOf(rings[ring], ring, found.modes);
+    ASSERT_EQ(residual.shares.size(), 4U);
+    EXPECT_EQ(residual.samples.size(), rings[ring].samples.size());
+    // Without a fit to each strike 18 and 4 % are left.
+    EXPECT_LT(residual.shares[3].share, 1e-3) << ring;
+  }
 }
 
 }  // namespace
