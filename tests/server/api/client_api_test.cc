@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <memory>
-#include <optional>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
+//
+// What one client may have, for how long, and what it may send.
+#include <set>
 
 #include "server/api/edge/client_limits.h"
+#include "server/api/edge/flood_guard.h"
+#include "server/api/edge/scene_leases.h"
 #include "tests/server/api/served_daemon.h"
+#include "tests/server/audio_device/manual_clock.h"
 
 namespace carillon {
 namespace {
+
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
 
 /// A daemon that waits a short while for clients, and is served over TCP, too.
 class ClientApi : public ServedDaemon {
@@ -23,19 +23,11 @@ class ClientApi : public ServedDaemon {
       : ServedDaemon({.scene_grace_s = 0.2, .client_share = 0.25, .rendering_idle_s = 2},
                      {"127.0.0.1:0", "[::1]:0"}) {}
 
-  /// A connection of its own to one of the daemon's addresses.
-  static std::shared_ptr<grpc::Channel> Connect(const std::string& address) {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-    return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-  }
-
   static std::string CreateSceneOn(const std::shared_ptr<grpc::Channel>& channel,
                                    const v1::CreateSceneRequest& request = {}) {
-    const auto stub = v1::SceneService::NewStub(channel);
     v1::CreateSceneResponse response;
     const grpc::Status status =
-        Call(*stub, &v1::SceneService::Stub::CreateScene, request, response);
+        Call(*v1::SceneService::NewStub(channel), &SceneStub::CreateScene, request, response);
     return status.ok() ? response.name() : ErrorOf(status).reason();
   }
 
@@ -43,19 +35,15 @@ class ClientApi : public ServedDaemon {
   /// refusal.
   std::string ExportAll(const v1::ExportModalModelRequest& request) {
     grpc::ClientContext context;
-    const auto stub = v1::ModalModelService::NewStub(Connect(address()));
-    const auto reader = stub->ExportModalModel(&context, request);
+    const auto stub = v1::ModalModelService::NewStub(Connect(address_));
     v1::ExportModalModelResponse response;
-    while (reader->Read(&response)) {
-    }
-    const grpc::Status status = reader->Finish();
+    const grpc::Status status = ReadToEnd(*stub->ExportModalModel(&context, request), response);
     return status.ok() ? "" : ErrorOf(status).reason();
   }
 
   std::optional<v1::Scene> FindScene(const std::string& name) {
-    v1::ListScenesResponse response;
-    EXPECT_TRUE(Call(*scenes, &v1::SceneService::Stub::ListScenes, {}, response).ok());
-    for (const v1::Scene& scene : response.scenes()) {
+    const v1::ListScenesResponse listed = Called(*scenes, &SceneStub::ListScenes, {});
+    for (const v1::Scene& scene : listed.scenes()) {
       if (scene.name() == name) return scene;
     }
     return std::nullopt;
@@ -63,7 +51,7 @@ class ClientApi : public ServedDaemon {
 };
 
 TEST_F(ClientApi, ASceneEndsAfterItsConnectionOverAnyKindOfAddress) {
-  for (const std::string& address : addresses()) {
+  for (const std::string& address : server_->addresses()) {
     auto channel = Connect(address);
     auto other = Connect(address);
     const std::string kept = CreateSceneOn(other);
@@ -81,21 +69,21 @@ TEST_F(ClientApi, ASceneEndsAfterItsConnectionOverAnyKindOfAddress) {
 }
 
 TEST_F(ClientApi, AClientMayNotHaveMoreThanItsShareOfAllObjects) {
-  const auto channel = Connect(address());
+  const auto channel = Connect(address_);
   v1::AddObjectsRequest request;
   request.set_scene(CreateSceneOn(channel));
   for (int i = 0; i < 1025; ++i) request.add_objects();  // one more than a quarter of 4096
-  v1::AddObjectsResponse response;
   const auto stub = v1::SceneService::NewStub(channel);
-  const grpc::Status status = Call(*stub, &v1::SceneService::Stub::AddObjects, request, response);
-  EXPECT_EQ(ErrorOf(status).reason(), "CLIENT_LIMIT_REACHED");
+  const auto reason = [&] {
+    return ErrorOf(Call(*stub, &SceneStub::AddObjects, request)).reason();
+  };
+  EXPECT_EQ(reason(), "CLIENT_LIMIT_REACHED");
   request.mutable_objects()->RemoveLast();
-  const grpc::Status within = Call(*stub, &v1::SceneService::Stub::AddObjects, request, response);
-  EXPECT_NE(ErrorOf(within).reason(), "CLIENT_LIMIT_REACHED");  // they name no model
+  EXPECT_NE(reason(), "CLIENT_LIMIT_REACHED");  // they name no model
 }
 
 TEST_F(ClientApi, ASceneThatIsToBeKeptOutlivesItsConnection) {
-  auto channel = Connect(address());
+  auto channel = Connect(address_);
   v1::CreateSceneRequest request;
   request.set_keep(true);
   const std::string kept = CreateSceneOn(channel, request);
@@ -110,14 +98,14 @@ TEST_F(ClientApi, ASceneThatIsToBeKeptOutlivesItsConnection) {
 }
 
 TEST_F(ClientApi, OneClientHasAShareOfAllScenesAndOthersHaveTheirs) {
-  const auto greedy = Connect(address());
+  const auto greedy = Connect(address_);
   for (size_t i = 0; i < SceneRegistry::kMaxSceneCount / 4; ++i) {
     ASSERT_THAT(CreateSceneOn(greedy), testing::StartsWith("scenes/")) << i;
   }
   EXPECT_EQ(CreateSceneOn(greedy), "CLIENT_LIMIT_REACHED");
   // On the Unix socket a process is one client, however many connections it has.
-  EXPECT_EQ(CreateSceneOn(Connect(address())), "CLIENT_LIMIT_REACHED");
-  EXPECT_THAT(CreateSceneOn(Connect(addresses().back())), testing::StartsWith("scenes/"));
+  EXPECT_EQ(CreateSceneOn(Connect(address_)), "CLIENT_LIMIT_REACHED");
+  EXPECT_THAT(CreateSceneOn(Connect(server_->addresses().back())), testing::StartsWith("scenes/"));
 }
 
 TEST_F(ClientApi, ARenderingWhoseClientSaysNothingEnds) {
@@ -129,7 +117,7 @@ TEST_F(ClientApi, ARenderingWhoseClientSaysNothingEnds) {
   v1::RenderResponse response;
   EXPECT_FALSE(call->Read(&response));
   ExpectRefused(call->Finish(), grpc::DEADLINE_EXCEEDED, "CLIENT_IDLE");
-  while (server().clients().renderings > 0) {
+  while (server_->clients().renderings > 0) {
   }
 }
 
@@ -145,15 +133,15 @@ TEST_F(ClientApi, AnUploadWhoseClientSaysNothingEndsAndStoresNothing) {
 
 TEST_F(ClientApi, ExportsThatNobodyReadAreBoundedAndEnd) {
   // gRPC takes some of a model from the daemon before the client reads, but not megabytes.
-  const std::string model = ImportModel(SampleModel(300, 4000));
-  v1::ExportModalModelRequest request;
-  request.set_name(model);
+  ModalModel model = SampleModel(300, 4000);
+  model.digest = std::string(64, 'b');
+  const auto request = Named<v1::ExportModalModelRequest>(ImportModel(model));
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
   std::vector<std::unique_ptr<grpc::ClientReader<v1::ExportModalModelResponse>>> exports;
   for (size_t i = 0; i < kMaxExportCount / 4; ++i) {
     // Exports that share a connection would share what gRPC takes ahead, and help one another on.
     contexts.push_back(std::make_unique<grpc::ClientContext>());
-    const auto stub = v1::ModalModelService::NewStub(Connect(address()));
+    const auto stub = v1::ModalModelService::NewStub(Connect(address_));
     exports.push_back(stub->ExportModalModel(contexts.back().get(), request));
     exports.back()->WaitForInitialMetadata();
   }
@@ -167,9 +155,7 @@ TEST_F(ClientApi, ExportsThatNobodyReadAreBoundedAndEnd) {
   v1::ExportModalModelResponse response;
   int cancelled_count = 0;
   for (const auto& unread : exports) {
-    while (unread->Read(&response)) {
-    }
-    cancelled_count += unread->Finish().error_code() == grpc::CANCELLED ? 1 : 0;
+    cancelled_count += ReadToEnd(*unread, response).error_code() == grpc::CANCELLED ? 1 : 0;
   }
   EXPECT_GT(cancelled_count, 0);
 }
@@ -184,6 +170,88 @@ TEST_F(ClientApi, ACompressedMessageIsRefusedBeforeItIsUnpacked) {
   upload->Write(request);
   upload->WritesDone();
   EXPECT_EQ(upload->Finish().error_code(), grpc::UNIMPLEMENTED);
+}
+
+TEST(AllowedBytes, GrowWithWhatWasReceivedAndWithTime) {
+  EXPECT_EQ(AllowedBytes(0, 0), 0U);
+  EXPECT_EQ(AllowedBytes(6400, 10), 100 + 10'240U);
+}
+
+/// A guard beside that of the daemon, of which it sees the connections, too.
+class FloodGuardTest : public ServedDaemon {
+ protected:
+  LimitedLog limited_log_{clock_, "clients", [](const std::string&) {}};
+  ConnectionGate gate_{8};
+  FloodGuard guard_{gate_, limited_log_};
+};
+
+TEST_F(FloodGuardTest, RestsUntilSomebodyIsConnectedAndThenLooksTwentyTimesASecond) {
+  EXPECT_TRUE(guard_.rests());
+  CreateScene();
+  EXPECT_GE(guard_.Look(), FloodGuard::kPeriod);
+  EXPECT_FALSE(guard_.rests());
+}
+
+class SceneLeasesTest : public testing::Test {
+ protected:
+  void Pass(seconds time) { clock_.SleepUntil(clock_.Monotonic() + time); }
+
+  ManualClock clock_;
+  std::set<std::string> open_{"a", "b"};
+  SceneLeases leases_{clock_, seconds(60),
+                      [this](const auto& each) { return open_.contains(each); }};
+};
+
+TEST_F(SceneLeasesTest, ASceneEndsAGraceAfterItsLastConnectionWasClosed) {
+  leases_.Begin(1, "a", false);
+  leases_.Use(1, "b");
+  open_.erase("a");
+  Pass(seconds(1000));
+  EXPECT_THAT(leases_.Expired(), IsEmpty());
+  EXPECT_EQ(leases_.StateOf(1).connection_count, 1U);
+  EXPECT_FALSE(leases_.StateOf(1).ends_in_s);
+  open_.erase("b");
+  EXPECT_THAT(leases_.Expired(), IsEmpty());
+  Pass(seconds(59));
+  EXPECT_THAT(leases_.Expired(), IsEmpty());
+  EXPECT_DOUBLE_EQ(*leases_.StateOf(1).ends_in_s, 1);
+  Pass(seconds(1));
+  EXPECT_THAT(leases_.Expired(), ElementsAre(1));
+}
+
+TEST_F(SceneLeasesTest, TheLongestAbandonedSceneMakesRoomFirst) {
+  const auto any = [](uint64_t) { return true; };
+  leases_.Begin(1, "a", false);
+  leases_.Begin(2, "b", false);
+  leases_.Begin(3, "c", false);
+  open_ = {"a", "c"};
+  EXPECT_EQ(leases_.LongestAbandoned(any), 2U);
+  Pass(seconds(1));
+  open_ = {"c"};
+  EXPECT_EQ(leases_.LongestAbandoned(any), 2U);
+  EXPECT_EQ(leases_.LongestAbandoned([](uint64_t scene) { return scene != 2; }), 1U);
+  leases_.End(2);
+  leases_.End(1);
+  EXPECT_FALSE(leases_.LongestAbandoned(any));
+}
+
+TEST(ClientLimits, TheMemoryOfAllRenderingsIsBounded) {
+  constexpr Holding kMib = Holding::kRenderingMib;
+  ClientLimits limits(0.5);
+  const size_t half = MostRenderingMib() / 2;
+  ClientPlace first(limits, kMib, "a");
+  ClientPlace second(limits, kMib, "b");
+  EXPECT_TRUE(first.Grow(half - 1).ok());
+  EXPECT_TRUE(first.Grow(half).ok());
+  EXPECT_THAT(first.Grow(half + 1).ToString(), testing::HasSubstr("CLIENT_LIMIT_REACHED"));
+  EXPECT_EQ(limits.count(kMib), half);
+  EXPECT_EQ(first.most(), half);
+  EXPECT_TRUE(second.Grow(half).ok());
+  ClientPlace third(limits, kMib, "c");
+  EXPECT_THAT(third.Grow(2).ToString(), testing::HasSubstr("TOO_MANY_CALLS"));
+  first = ClientPlace();
+  EXPECT_TRUE(third.Grow(2).ok());
+  EXPECT_EQ(limits.count(kMib), half + 2);
 }
 
 }  // namespace

@@ -1,33 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>
-#include <gtest/gtest.h>
 
-#include <string>
-#include <vector>
-
+#include "server/decomposition/job/decomposition_request.h"
 #include "tests/server/api/served_daemon.h"
-#include "tests/server/mode_database/sample_transfer.h"
 
 namespace carillon {
 namespace {
 
 class ModelApi : public ServedDaemon {
  protected:
-  grpc::Status Create(const v1::CreateModalModelRequest& request, v1::Job& job) {
-    grpc::ClientContext context;
-    v1::CreateModalModelResponse response;
-    grpc::Status status = models->CreateModalModel(&context, request, &response);
-    job = response.job();
-    return status;
-  }
-
   grpc::Status GetShapes(const std::string& name, const std::vector<uint32_t>& modes,
                          const std::vector<uint32_t>& vertices,
                          std::vector<v1::ModeShape>& shapes) {
     grpc::ClientContext context;
-    v1::GetShapesRequest request;
-    request.set_name(name);
+    auto request = Named<v1::GetShapesRequest>(name);
     request.mutable_modes()->Add(modes.begin(), modes.end());
     request.mutable_vertices()->Add(vertices.begin(), vertices.end());
     const auto reader = models->GetShapes(&context, request);
@@ -41,8 +27,7 @@ class ModelApi : public ServedDaemon {
   grpc::Status Export(const std::string& name, std::vector<v1::ModalModelRecord>& records,
                       bool without_shapes = false) {
     grpc::ClientContext context;
-    v1::ExportModalModelRequest request;
-    request.set_name(name);
+    auto request = Named<v1::ExportModalModelRequest>(name);
     request.set_without_shapes(without_shapes);
     const auto reader = models->ExportModalModel(&context, request);
     v1::ExportModalModelResponse response;
@@ -51,80 +36,27 @@ class ModelApi : public ServedDaemon {
   }
 };
 
-TEST_F(ModelApi, AMeshIsStoredUnderTheDigestOfItsBytes) {
-  v1::UploadMeshResponse response;
-  ASSERT_TRUE(Upload({"ab", "c"}, response).ok());
-  EXPECT_EQ(response.mesh_digest(),
-            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");  // FIPS 180-4
-  EXPECT_EQ(response.byte_count(), 3U);
-}
-
 TEST_F(ModelApi, ARequestThatCannotBeComputedIsRefused) {
-  const v1::CreateModalModelRequest good = RequestFor("mesh");
-  v1::Job job;
-  v1::CreateModalModelRequest request = good;
+  v1::CreateModalModelRequest request = RequestFor("mesh");
   request.set_mesh_digest(std::string(64, '0'));
-  ExpectRefused(Create(request, job), grpc::NOT_FOUND, "MESH_NOT_FOUND");
-  request = good;
+  ExpectRefused(Call(*models, &ModelStub::CreateModalModel, request), grpc::NOT_FOUND,
+                "MESH_NOT_FOUND");
+  request = RequestFor("mesh");
   request.set_mesh_format("doc");
-  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "MESH_FORMAT_UNKNOWN");
-  request = good;
-  request.mutable_material()->set_preset("cheese");
-  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL");
-  request = good;
-  request.mutable_settings()->set_poisson_ratio(0.5);
-  ExpectRefused(Create(request, job), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
-}
-
-TEST_F(ModelApi, AWatchedJobIsSeenUntilItHasEnded) {
-  v1::Job job;
-  ASSERT_TRUE(Create(RequestFor("mesh"), job).ok());
-  grpc::ClientContext context;
-  v1::WatchJobRequest request;
-  request.set_name(job.name());
-  const auto reader = jobs->WatchJob(&context, request);
-  v1::WatchJobResponse seen;
-  int message_count = 0;
-  while (reader->Read(&seen)) ++message_count;
-  EXPECT_TRUE(reader->Finish().ok());
-  EXPECT_GE(message_count, 1);
-  EXPECT_EQ(seen.job().state(), v1::JOB_STATE_FAILED);  // its worker only exits
-  EXPECT_NE(seen.job().error().reason(), "");
-
-  v1::GetJobRequest get;
-  get.set_name(job.name());
-  v1::GetJobResponse got;
-  grpc::ClientContext get_context;
-  ASSERT_TRUE(jobs->GetJob(&get_context, get, &got).ok());
-  EXPECT_EQ(got.job().state(), v1::JOB_STATE_FAILED);
-  v1::ListJobsResponse listed;
-  grpc::ClientContext list_context;
-  ASSERT_TRUE(jobs->ListJobs(&list_context, {}, &listed).ok());
-  ASSERT_EQ(listed.jobs_size(), 1);
-  EXPECT_EQ(listed.jobs(0).name(), job.name());
+  ExpectRefused(Call(*models, &ModelStub::CreateModalModel, request), kInvalid,
+                "MESH_FORMAT_UNKNOWN");
 }
 
 TEST_F(ModelApi, AJobThatIsNotThereIsNotFound) {
   for (const std::string& name :
-       {std::string("jobs/").append(64, '0'), std::string("jobs"), std::string()}) {
-    v1::GetJobRequest get;
-    get.set_name(name);
-    v1::GetJobResponse got;
-    grpc::ClientContext get_context;
-    ExpectRefused(jobs->GetJob(&get_context, get, &got), grpc::NOT_FOUND, "JOB_NOT_FOUND");
-    v1::CancelJobRequest cancel;
-    cancel.set_name(name);
-    v1::CancelJobResponse cancelled;
-    grpc::ClientContext cancel_context;
-    ExpectRefused(jobs->CancelJob(&cancel_context, cancel, &cancelled), grpc::NOT_FOUND,
-                  "JOB_NOT_FOUND");
-    v1::WatchJobRequest watch;
-    watch.set_name(name);
-    grpc::ClientContext watch_context;
-    const auto reader = jobs->WatchJob(&watch_context, watch);
-    v1::WatchJobResponse seen;
-    EXPECT_FALSE(reader->Read(&seen));
-    ExpectRefused(reader->Finish(), grpc::NOT_FOUND, "JOB_NOT_FOUND");
+       {"jobs/" + std::string(64, '0'), std::string("jobs"), std::string()}) {
+    grpc::ClientContext context;
+    const auto reader = jobs->WatchJob(&context, Named<v1::WatchJobRequest>(name));
+    for (const grpc::Status& status :
+         {Call(*jobs, &JobStub::GetJob, Named<v1::GetJobRequest>(name)),
+          Call(*jobs, &JobStub::CancelJob, Named<v1::CancelJobRequest>(name)), reader->Finish()}) {
+      ExpectRefused(status, grpc::NOT_FOUND, "JOB_NOT_FOUND");
+    }
   }
 }
 
@@ -172,29 +104,92 @@ TEST_F(ModelApi, ShapesOfModesAtVerticesAreThoseOfTheModelTo16Bits) {
   ASSERT_TRUE(GetShapes(name, {}, {}, shapes).ok());
   ASSERT_EQ(shapes.size(), mode_count);
   EXPECT_EQ(shapes[0].components().size(), 6 * model.vertices.size());
-  ExpectRefused(GetShapes(name, {mode_count}, {}, shapes), grpc::INVALID_ARGUMENT,
-                "INVALID_SETTINGS");
-  ExpectRefused(GetShapes(name, {}, {1'000'000}, shapes), grpc::INVALID_ARGUMENT,
-                "INVALID_SETTINGS");
+  ExpectRefused(GetShapes(name, {mode_count}, {}, shapes), kInvalid, "INVALID_SETTINGS");
+  ExpectRefused(GetShapes(name, {}, {1'000'000}, shapes), kInvalid, "INVALID_SETTINGS");
 }
 
 TEST_F(ModelApi, AListEndsAPageBeforeItIsTooLargeForAClient) {
   std::vector<v1::ModalModelRecord> records = SampleRecords(*SmallModel());
   records[0].mutable_header()->add_warnings(std::string(900'000, 'w'));
   for (const char digit : {'1', '2', '3', '4', '5', '6'}) {
-    v1::ImportModalModelResponse imported;
-    ASSERT_TRUE(Import(*models, "modalModels/" + std::string(64, digit), records, imported).ok());
+    ASSERT_TRUE(Import(*models, "modalModels/" + std::string(64, digit), records).ok());
   }
   v1::ListModalModelsRequest request;
   size_t count = 0;
   do {
-    v1::ListModalModelsResponse page;
-    ASSERT_TRUE(Call(*models, &v1::ModalModelService::Stub::ListModalModels, request, page).ok());
+    const v1::ListModalModelsResponse page = Called(*models, &ModelStub::ListModalModels, request);
     EXPECT_LT(page.ByteSizeLong(), 3U << 20U);
     count += static_cast<size_t>(page.modal_models_size());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty());
   EXPECT_EQ(count, 6U);
+}
+
+/// A daemon with two clients. The one over the Unix socket has every role. The one over TCP, the
+/// neighbour, has the role submit but not the role administer.
+class SharedModelsApi : public ServedDaemon {
+ protected:
+  SharedModelsApi() : ServedDaemon({.client_share = 1}, {"127.0.0.1:0"}) {}
+
+  static std::vector<v1::ModalModelRecord> OtherRecords() {
+    ModalModel other = *SmallModel();
+    for (double& eigenvalue : other.eigenvalues) eigenvalue *= 2;
+    return SampleRecords(other);
+  }
+
+  v1::ModalModelSummary Get(const std::string& name) {
+    return Called(*models, &ModelStub::GetModalModel, Named<v1::GetModalModelRequest>(name))
+        .modal_model();
+  }
+
+  /// Pins the model, or no longer; returns its revision.
+  int64_t Pin(const std::string& name, bool pinned) {
+    auto request = Named<v1::UpdateModalModelRequest>(name);
+    request.set_pinned(pinned);
+    return Called(*models, &ModelStub::UpdateModalModel, request).modal_model().revision();
+  }
+
+  std::unique_ptr<ModelStub> neighbours_ =
+      v1::ModalModelService::NewStub(Connect(server_->addresses().back()));
+};
+
+TEST_F(SharedModelsApi, AClientCannotReplaceTheModelOfOthers) {
+  const std::string name = ImportSmallModel();
+  const v1::ModalModelSummary before = Get(name);
+  ExpectRefused(Import(*neighbours_, name, OtherRecords()), grpc::ALREADY_EXISTS,
+                "MODAL_MODEL_EXISTS");
+  EXPECT_TRUE(Import(*neighbours_, name, SampleRecords(*SmallModel())).ok()) << "the same model";
+  const v1::ModalModelSummary after = Get(name);
+  EXPECT_EQ(after.revision(), before.revision());
+  EXPECT_EQ(after.eigenvalues(0), before.eigenvalues(0));
+  EXPECT_TRUE(Import(*neighbours_, "", OtherRecords()).ok()) << "under a name of its own";
+}
+
+TEST_F(SharedModelsApi, WhoMayAdministerReplacesAModelThatIsNotPinned) {
+  const std::string name = ImportSmallModel();
+  Pin(name, true);
+  ExpectRefused(Import(*models, name, OtherRecords()), grpc::ALREADY_EXISTS, "MODAL_MODEL_EXISTS");
+  const int64_t revision = Pin(name, false);
+  EXPECT_TRUE(Import(*models, name, OtherRecords()).ok());
+  EXPECT_GT(Get(name).revision(), revision);
+}
+
+TEST_F(SharedModelsApi, ARequestDoesNotChangeAPinnedModelOfOthers) {
+  v1::CreateModalModelRequest request = RequestFor("mesh");
+  request.mutable_settings()->set_poisson_ratio(SmallModel()->poisson_ratio);
+  *request.mutable_material() = SmallMaterial();
+  const std::string name = "modalModels/" + RequestDigest(*ResolveRequest(request));
+  ASSERT_TRUE(Import(*models, name, SampleRecords(*SmallModel())).ok());
+  const int64_t revision = Pin(name, true);
+  EXPECT_TRUE(Call(*neighbours_, &ModelStub::CreateModalModel, request).ok())
+      << "the model has every mode that this request wants";
+  request.set_max_frequency_hz(1e9);
+  for (int i = 0; i < 2; ++i) {
+    ExpectRefused(Call(*neighbours_, &ModelStub::CreateModalModel, request),
+                  grpc::PERMISSION_DENIED, "ROLE_MISSING");
+  }
+  EXPECT_FALSE(Get(name).has_material());
+  EXPECT_EQ(Get(name).revision(), revision);
 }
 
 }  // namespace

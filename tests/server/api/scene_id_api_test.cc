@@ -1,28 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Scenes with ids of the client's choice, and many objects in one call.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <cstdint>
-#include <filesystem>
-#include <fstream>
 #include <functional>
-#include <memory>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "server/base/sha256.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
 namespace {
-
-using SceneStub = v1::SceneService::Stub;
 
 v1::CreateSceneRequest Wanted(const std::string& id) {
   v1::CreateSceneRequest request;
@@ -32,34 +19,18 @@ v1::CreateSceneRequest Wanted(const std::string& id) {
 
 class SceneIdApi : public ServedDaemon {
  protected:
-  explicit SceneIdApi(ApiSettings settings = {.client_share = 1},
-                      const std::vector<std::string>& more = {})
-      : ServedDaemon(std::move(settings), more) {}
+  using ServedDaemon::ServedDaemon;
 
   grpc::Status Create(const v1::CreateSceneRequest& request) {
     return Call(*scenes, &SceneStub::CreateScene, request, created);
   }
 
-  grpc::Status Get(const std::string& name, v1::Scene& scene) {
-    v1::GetSceneRequest request;
-    request.set_name(name);
-    v1::GetSceneResponse response;
-    grpc::Status status = Call(*scenes, &SceneStub::GetScene, request, response);
-    scene = response.scene();
-    return status;
+  v1::Scene Get(const std::string& name) {
+    return Called(*scenes, &SceneStub::GetScene, Named<v1::GetSceneRequest>(name)).scene();
   }
 
   grpc::Status Delete(const std::string& name) {
-    v1::DeleteSceneRequest request;
-    request.set_name(name);
-    v1::DeleteSceneResponse response;
-    return Call(*scenes, &SceneStub::DeleteScene, request, response);
-  }
-
-  uint32_t CountScenes() {
-    v1::ListScenesResponse response;
-    EXPECT_TRUE(Call(*scenes, &SceneStub::ListScenes, {}, response).ok());
-    return static_cast<uint32_t>(response.scenes_size());
+    return Call(*scenes, &SceneStub::DeleteScene, Named<v1::DeleteSceneRequest>(name));
   }
 
   v1::CreateSceneResponse created;
@@ -72,22 +43,18 @@ TEST_F(SceneIdApi, TheSameRequestAgainGivesTheSameSceneWithItsObjects) {
   ASSERT_TRUE(Create(request).ok());
   EXPECT_EQ(created.name(), "scenes/lathe-1");
   EXPECT_FALSE(created.existing());
-  v1::AddObjectsResponse added;
-  ASSERT_TRUE(Add(SmallObject(created.name()), added).ok());
+  const auto added = Called(*scenes, &SceneStub::AddObjects, SmallObject(created.name()));
   EXPECT_EQ(added.objects(0).name(), "scenes/lathe-1/objects/1");
-  v1::UpdateSceneRequest louder;
-  louder.set_name(created.name());
+  auto louder = Named<v1::UpdateSceneRequest>(created.name());
   louder.set_gain(2);
-  v1::UpdateSceneResponse updated;
-  ASSERT_TRUE(Call(*scenes, &SceneStub::UpdateScene, louder, updated).ok());
+  Called(*scenes, &SceneStub::UpdateScene, louder);
   // The same settings, written otherwise.
   request.mutable_hearing()->set_reference_distance_m(1);
   request.mutable_listener();
   ASSERT_TRUE(Create(request).ok());
   EXPECT_TRUE(created.existing());
-  EXPECT_EQ(CountScenes(), 1U);
-  v1::Scene scene;
-  ASSERT_TRUE(Get("scenes/lathe-1", scene).ok());
+  EXPECT_EQ(Called(*scenes, &SceneStub::ListScenes, {}).scenes_size(), 1);
+  const v1::Scene scene = Get("scenes/lathe-1");
   EXPECT_EQ(scene.name(), "scenes/lathe-1");
   EXPECT_EQ(scene.object_count(), 1U);
   EXPECT_EQ(scene.gain(), 2);
@@ -125,7 +92,7 @@ TEST_F(SceneIdApi, AnIdHasTheStatedForm) {
   for (const std::string& id : {std::string("1"), std::string("-a"), std::string("A"),
                                 std::string("a/b"), std::string("a b"), std::string("\xc3\xa4"),
                                 std::string("a\0b", 3), std::string("a\n"), std::string(65, 'z')}) {
-    ExpectRefused(Create(Wanted(id)), grpc::INVALID_ARGUMENT, "INVALID_SETTINGS");
+    ExpectRefused(Create(Wanted(id)), kInvalid, "INVALID_SETTINGS");
   }
 }
 
@@ -135,17 +102,12 @@ class BriefSceneIdApi : public SceneIdApi {
 };
 
 TEST_F(BriefSceneIdApi, AnIdIsFreeAgainWhenItsSceneHasEndedWithItsClient) {
-  grpc::ChannelArguments own;
-  own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  auto channel = grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
-  v1::CreateSceneResponse response;
-  ASSERT_TRUE(
-      Call(*v1::SceneService::NewStub(channel), &SceneStub::CreateScene, Wanted("brief"), response)
-          .ok());
+  auto channel = Connect(address_);
+  Called(*v1::SceneService::NewStub(channel), &SceneStub::CreateScene, Wanted("brief"));
   channel.reset();
   // Looking does not make it last.
-  v1::Scene scene;
-  while (Get("scenes/brief", scene).ok()) {
+  const auto brief = Named<v1::GetSceneRequest>("scenes/brief");
+  while (Call(*scenes, &SceneStub::GetScene, brief).ok()) {
   }
   // The daemon logs the end after it.
   while (!absl::StrContains(log(), "scenes/brief has ended: its clients have gone")) {
@@ -161,19 +123,17 @@ class GuardedSceneIdApi : public SceneIdApi {
 
   static std::string AccessFile() {
     std::string path = testing::TempDir() + "/carillon_scene_id_access";
-    std::filesystem::remove(path);
-    std::ofstream(path) << "ann strike sha256:" << Sha256Hex("ann's") << "\nboss strike,administer "
-                        << "sha256:" << Sha256Hex("boss's") << "\n";
-    std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+    WriteBytes(path, "ann strike sha256:" + Sha256Hex("ann's") +
+                         "\nboss strike,administer sha256:" + Sha256Hex("boss's") + "\n");
+    std::filesystem::permissions(path, std::filesystem::perms(0600));
     return path;
   }
 
   grpc::Status CreateAs(const std::string& token, const std::string& id) {
-    const auto channel =
-        grpc::CreateChannel(addresses().back(), grpc::InsecureChannelCredentials());
     grpc::ClientContext context;
     context.AddMetadata("authorization", "Bearer " + token);
-    return v1::SceneService::NewStub(channel)->CreateScene(&context, Wanted(id), &created);
+    const auto stub = v1::SceneService::NewStub(Connect(server_->addresses().back()));
+    return stub->CreateScene(&context, Wanted(id), &created);
   }
 };
 
@@ -198,38 +158,29 @@ class AddObjectsApi : public SceneIdApi {
     return request;
   }
 
-  grpc::Status AddAll(const v1::AddObjectsRequest& request) {
-    return Call(*scenes, &SceneStub::AddObjects, request, added_);
-  }
-
-  void ExpectRefusedAt(const v1::AddObjectsRequest& request, grpc::StatusCode code,
-                       const char* reason, const std::string& index) {
-    const grpc::Status status = AddAll(request);
+  void ExpectRefusedAt(int index, const v1::AddObjectsRequest& request, grpc::StatusCode code,
+                       const char* reason) {
+    const grpc::Status status = Call(*scenes, &SceneStub::AddObjects, request);
     ExpectRefused(status, code, reason);
-    EXPECT_EQ(ErrorOf(status).metadata().at("index"), index);
-    EXPECT_THAT(ErrorOf(status).message(), testing::StartsWith("objects[" + index + "]: "));
-    v1::Scene scene;
-    ASSERT_TRUE(Get(scene_, scene).ok());
-    EXPECT_EQ(scene.object_count(), 0U) << reason;
+    EXPECT_EQ(ErrorOf(status).metadata().at("index"), absl::StrCat(index));
+    EXPECT_THAT(ErrorOf(status).message(),
+                testing::StartsWith(absl::StrCat("objects[", index, "]")));
+    EXPECT_EQ(Get(scene_).object_count(), 0U) << reason;
   }
 
   const std::string scene_ = CreateScene();
-  v1::AddObjectsResponse added_;
 };
 
 TEST_F(AddObjectsApi, OneThatIsRefusedKeepsAllOthersOutAndIsNamed) {
-  v1::AddObjectsRequest request = Objects({1, 2, 3, 2});
-  ExpectRefusedAt(request, grpc::ALREADY_EXISTS, "OBJECT_EXISTS", "3");
-  request = Objects({1, 2, 3});
+  ExpectRefusedAt(3, Objects({1, 2, 3, 2}), grpc::ALREADY_EXISTS, "OBJECT_EXISTS");
+  v1::AddObjectsRequest request = Objects({1, 2, 3});
   request.mutable_objects(2)->set_size(-1);
-  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "INVALID_SETTINGS", "2");
-  request = Objects({1, 2, 3});
+  ExpectRefusedAt(2, request, kInvalid, "INVALID_SETTINGS");
   request.mutable_objects(1)->set_modal_model("modalModels/none");
-  ExpectRefusedAt(request, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND", "1");
-  request = Objects({1, 2, 3});
+  ExpectRefusedAt(1, request, grpc::NOT_FOUND, "MODAL_MODEL_NOT_FOUND");
   request.mutable_objects(0)->mutable_material()->set_preset("unobtainium");
-  ExpectRefusedAt(request, grpc::INVALID_ARGUMENT, "UNKNOWN_MATERIAL", "0");
-  EXPECT_TRUE(AddAll(Objects({1, 2})).ok());
+  ExpectRefusedAt(0, request, kInvalid, "UNKNOWN_MATERIAL");
+  Called(*scenes, &SceneStub::AddObjects, Objects({1, 2}));
 }
 
 }  // namespace

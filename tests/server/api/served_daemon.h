@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
+#include <type_traits>
 #include <vector>
 
 #include "carillon/v1/audio_service.grpc.pb.h"
@@ -20,37 +20,92 @@
 #include "carillon/v1/scene_service.grpc.pb.h"
 #include "carillon/v1/server_service.grpc.pb.h"
 #include "server/api/api_server.h"
+#include "server/base/mutex.h"
+#include "server/decomposition/worker/local_executor.h"
 #include "server/live_output/live_output.h"
-#include "tests/server/api/daemon_rooms.h"
 #include "tests/server/mode_database/sample_model.h"
 #include "tests/server/scene/small_model.h"
 
 namespace carillon {
 
-/// A daemon as DaemonRooms, and clients of it.
+inline constexpr auto kInvalid = grpc::StatusCode::INVALID_ARGUMENT;
+
+using AudioStub = v1::AudioService::Stub;
+using JobStub = v1::DecompositionService::Stub;
+using ModelStub = v1::ModalModelService::Stub;
+using SceneStub = v1::SceneService::Stub;
+
+/// A method with one request and one response.
+template <typename Stub, typename Request, typename Response>
+using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
+
+/// The request about what has a name.
+template <typename Request>
+Request Named(const std::string& name) {
+  Request request;
+  request.set_name(name);
+  return request;
+}
+
+/// All rooms of a daemon, on the null device, which serves on a Unix socket, and clients of it. Its
+/// decompositions fail: the worker is a program that only exits.
 class ServedDaemon : public testing::Test {
  protected:
   /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
   explicit ServedDaemon(ApiSettings settings = {.client_share = 1},
                         const std::vector<std::string>& more = {}) {
-    rooms_.Serve(std::move(settings), more);
-    channel_ = grpc::CreateChannel(rooms_.address, grpc::InsecureChannelCredentials());
-    models = v1::ModalModelService::NewStub(channel_);
-    jobs = v1::DecompositionService::NewStub(channel_);
-    scenes = v1::SceneService::NewStub(channel_);
-    contacts = v1::ContactService::NewStub(channel_);
-    audio = v1::AudioService::NewStub(channel_);
-    info = v1::ServerService::NewStub(channel_);
+    settings.addresses = {address_};
+    settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
+    settings.version = "test";
+    server_ = *ApiServer::Start(settings, {.database = *database_,
+                                           .decompositions = *queue_,
+                                           .scenes = scene_registry_,
+                                           .output = *output_,
+                                           .clock = clock_,
+                                           .log = [this](const std::string& line) { Note(line); },
+                                           .log_event = [this](const Event& event) { Note(event); },
+                                           .check_decomposition = [] { return absl::OkStatus(); }});
+  }
+
+  /// A connection of its own to one of the daemon's addresses.
+  static std::shared_ptr<grpc::Channel> Connect(const std::string& address) {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
   }
 
   /// Calls a method with one request and one response; the response stays in `response`.
   template <typename Stub, typename Request, typename Response>
-  static grpc::Status Call(Stub& stub,
-                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
-                                                        Response*),
-                           const Request& request, Response& response) {
+  static grpc::Status Call(Stub& stub, Method<Stub, Request, Response> method,
+                           const std::type_identity_t<Request>& request, Response& response) {
     grpc::ClientContext context;
     return (stub.*method)(&context, request, &response);
+  }
+
+  /// The status of such a call.
+  template <typename Stub, typename Request, typename Response>
+  static grpc::Status Call(Stub& stub, Method<Stub, Request, Response> method,
+                           const std::type_identity_t<Request>& request) {
+    Response response;
+    return Call(stub, method, request, response);
+  }
+
+  /// The response to such a call, which must succeed.
+  template <typename Stub, typename Request, typename Response>
+  static Response Called(Stub& stub, Method<Stub, Request, Response> method,
+                         const std::type_identity_t<Request>& request) {
+    Response response;
+    const grpc::Status status = Call(stub, method, request, response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response;
+  }
+
+  /// Reads a stream to its end; the last message stays in `last`.
+  template <typename Stream, typename Response>
+  static grpc::Status ReadToEnd(Stream& stream, Response& last) {
+    while (stream.Read(&last)) {
+    }
+    return stream.Finish();
   }
 
   /// Stores a mesh file that comes in pieces.
@@ -80,23 +135,19 @@ class ServedDaemon : public testing::Test {
   }
 
   v1::Job Submit(const v1::CreateModalModelRequest& request) {
-    v1::CreateModalModelResponse response;
-    EXPECT_TRUE(
-        Call(*models, &v1::ModalModelService::Stub::CreateModalModel, request, response).ok());
-    return response.job();
+    return Called(*models, &ModelStub::CreateModalModel, request).job();
   }
   v1::Job Submit(const std::string& label) {
     return Submit(RequestFor("the mesh of " + label, label));
   }
 
   /// Imports a model under a name, or under one that the daemon gives, with the label "small".
-  static grpc::Status Import(v1::ModalModelService::Stub& stub, const std::string& name,
-                             const std::vector<v1::ModalModelRecord>& records,
-                             v1::ImportModalModelResponse& response) {
+  static grpc::Status Import(ModelStub& stub, const std::string& name,
+                             const std::vector<v1::ModalModelRecord>& records) {
     grpc::ClientContext context;
+    v1::ImportModalModelResponse response;
     const auto writer = stub.ImportModalModel(&context, &response);
-    v1::ImportModalModelRequest request;
-    request.set_name(name);
+    auto request = Named<v1::ImportModalModelRequest>(name);
     request.set_label("small");
     for (const v1::ModalModelRecord& record : records) {
       *request.mutable_record() = record;
@@ -109,21 +160,21 @@ class ServedDaemon : public testing::Test {
   /// Stores SmallModel and returns its name.
   std::string ImportSmallModel() { return ImportModel(*SmallModel()); }
 
-  /// Stores a model under its digest, if it has one, and returns its name.
+  /// Stores a model under its digest and returns its name.
   std::string ImportModel(const ModalModel& model) {
-    v1::ImportModalModelResponse response;
-    const grpc::Status status =
-        Import(*models, model.digest.empty() ? "" : "modalModels/" + model.digest,
-               SampleRecords(model), response);
+    std::string name = "modalModels/" + model.digest;
+    const grpc::Status status = Import(*models, name, SampleRecords(model));
     EXPECT_TRUE(status.ok()) << status.error_message();
-    return response.modal_model().name();
+    return name;
   }
 
-  std::string CreateScene() {
-    grpc::ClientContext context;
-    v1::CreateSceneResponse response;
-    EXPECT_TRUE(scenes->CreateScene(&context, {}, &response).ok());
-    return response.name();
+  std::string CreateScene() { return Called(*scenes, &SceneStub::CreateScene, {}).name(); }
+
+  /// A scene with one object of SmallModel, whose handle is 1.
+  std::string CreateSceneWithObject() {
+    std::string scene = CreateScene();
+    Called(*scenes, &SceneStub::AddObjects, SmallObject(scene));
+    return scene;
   }
 
   /// What SmallModel is made of.
@@ -147,11 +198,6 @@ class ServedDaemon : public testing::Test {
     return request;
   }
 
-  grpc::Status Add(const v1::AddObjectsRequest& request, v1::AddObjectsResponse& response) {
-    grpc::ClientContext context;
-    return scenes->AddObjects(&context, request, &response);
-  }
-
   /// 1 N s along x at the origin of object `handle`.
   static v1::Contact Strike(uint32_t handle) {
     v1::Contact impulse;
@@ -162,27 +208,33 @@ class ServedDaemon : public testing::Test {
     return impulse;
   }
 
-  /// Strikes object 1 of a scene live; returns the last answer.
-  v1::StreamContactsResponse StrikeLive(const std::string& scene,
-                                        std::optional<double> scheduling_delay_s = {}) {
-    grpc::ClientContext context;
-    const auto stream = contacts->StreamContacts(&context);
+  /// The first request of a stream of contacts.
+  static v1::StreamContactsRequest StreamStart(const std::string& scene) {
     v1::StreamContactsRequest request;
     request.mutable_start()->set_scene(scene);
     request.mutable_start()->set_step_s(0.01);
-    if (scheduling_delay_s) {
-      request.mutable_start()->set_scheduling_delay_s(*scheduling_delay_s);
-    }
-    stream->Write(request);
-    request.Clear();
-    *request.add_steps()->add_contacts() = Strike(1);
-    stream->Write(request);
+    return request;
+  }
+
+  /// Sends `requests`, then reads to the end; the last answer stays in `last`.
+  grpc::Status Exchange(const std::vector<v1::StreamContactsRequest>& requests,
+                        v1::StreamContactsResponse& last) {
+    grpc::ClientContext context;
+    const auto stream = contacts->StreamContacts(&context);
+    for (const v1::StreamContactsRequest& request : requests) stream->Write(request);
     stream->WritesDone();
-    v1::StreamContactsResponse answer;
-    while (stream->Read(&answer)) {
-    }
-    EXPECT_TRUE(stream->Finish().ok());
-    return answer;
+    return ReadToEnd(*stream, last);
+  }
+
+  /// Strikes object 1 of a scene live; returns the last answer.
+  v1::StreamContactsResponse StrikeLive(const std::string& scene,
+                                        std::optional<double> scheduling_delay_s = {}) {
+    v1::StreamContactsRequest start = StreamStart(scene), strike;
+    if (scheduling_delay_s) start.mutable_start()->set_scheduling_delay_s(*scheduling_delay_s);
+    *strike.add_steps()->add_contacts() = Strike(1);
+    v1::StreamContactsResponse last;
+    EXPECT_TRUE(Exchange({start, strike}, last).ok());
+    return last;
   }
 
   /// The requests of an offline rendering: the settings, a header, one object that is struck, and
@@ -234,32 +286,57 @@ class ServedDaemon : public testing::Test {
     std::ranges::copy(block.samples(), reinterpret_cast<char*>(sound.data() + old_size));
   }
 
-  std::unique_ptr<v1::ModalModelService::Stub> models;
-  std::unique_ptr<v1::DecompositionService::Stub> jobs;
-  std::unique_ptr<v1::SceneService::Stub> scenes;
-  std::unique_ptr<v1::ContactService::Stub> contacts;
-  std::unique_ptr<v1::AudioService::Stub> audio;
-  std::unique_ptr<v1::ServerService::Stub> info;
-  std::shared_ptr<grpc::Channel> channel() { return channel_; }
-  LiveOutput& output() { return *rooms_.output; }
-  std::filesystem::path folder() const { return rooms_.folder / ""; }
-  const std::string& address() const { return rooms_.address; }
-  const std::vector<std::string>& addresses() const { return rooms_.server->addresses(); }
-  const ApiServer& server() const { return *rooms_.server; }
   /// The warnings so far, a line each.
   std::string log() {
-    const MutexLock lock(&rooms_.log_mutex);
-    return rooms_.log;
+    const MutexLock lock(&log_mutex_);
+    return log_;
   }
   /// The lines of the events so far.
   std::vector<std::string> events() {
-    const MutexLock lock(&rooms_.log_mutex);
-    return rooms_.events;
+    const MutexLock lock(&log_mutex_);
+    return events_;
   }
 
  private:
-  DaemonRooms rooms_;
-  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<DecompositionQueue> MakeQueue() {
+    LocalExecutorOptions options;
+    options.program = "/bin/false";
+    options.directory = folder_ / "work";
+    return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_,
+                                     {.log_event = [this](const Event& event) { Note(event); }});
+  }
+
+  void Note(const std::string& line) {
+    const MutexLock lock(&log_mutex_);
+    log_ += line + "\n";
+  }
+
+  void Note(const Event& event) {
+    const MutexLock lock(&log_mutex_);
+    events_.push_back(event.ToLine());
+  }
+
+  Mutex log_mutex_;
+  std::string log_;
+  std::vector<std::string> events_;
+
+ protected:
+  TemporaryFolder folder_;
+  const std::string address_ = "unix:" + (folder_ / "socket").string();
+  SystemClock clock_;
+  std::unique_ptr<ModeDatabase> database_ = *ModeDatabase::Open(folder_ / "carillon.db", clock_);
+  std::unique_ptr<DecompositionQueue> queue_ = MakeQueue();
+  std::unique_ptr<LiveOutput> output_ =
+      *LiveOutput::Start({.device = "null"}, clock_, [](const std::string&) {});
+  SceneRegistry scene_registry_{output_->mixer()};
+  std::unique_ptr<ApiServer> server_;
+  const std::shared_ptr<grpc::Channel> channel_ = Connect(address_);
+  const std::unique_ptr<ModelStub> models = v1::ModalModelService::NewStub(channel_);
+  const std::unique_ptr<JobStub> jobs = v1::DecompositionService::NewStub(channel_);
+  const std::unique_ptr<SceneStub> scenes = v1::SceneService::NewStub(channel_);
+  const std::unique_ptr<v1::ContactService::Stub> contacts = v1::ContactService::NewStub(channel_);
+  const std::unique_ptr<AudioStub> audio = v1::AudioService::NewStub(channel_);
+  const std::unique_ptr<v1::ServerService::Stub> info = v1::ServerService::NewStub(channel_);
 };
 
 /// What the trailing metadata of a refused call says.

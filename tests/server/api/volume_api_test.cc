@@ -1,58 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The volume of scenes and of the output, stops, stems and recorded contacts, as clients see them.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <string>
-#include <vector>
 
+#include "server/api/services/trace_recorders.h"
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
 namespace {
 
-constexpr auto kInvalid = grpc::StatusCode::INVALID_ARGUMENT;
-
 class VolumeApi : public ServedDaemon {
  protected:
-  v1::Scene Update(v1::UpdateSceneRequest request, const std::string& scene) {
-    request.set_name(scene);
-    v1::UpdateSceneResponse response;
-    const grpc::Status status =
-        Call(*scenes, &v1::SceneService::Stub::UpdateScene, request, response);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return response.scene();
-  }
-
-  std::string SceneWithObject() {
-    std::string scene = CreateScene();
-    v1::AddObjectsResponse added;
-    EXPECT_TRUE(Add(SmallObject(scene), added).ok());
-    return scene;
-  }
-
-  /// Strikes the scene and stops all scenes while it rings. The model rings for seconds, so that
-  /// only the stop ends it before the test's time is over.
-  v1::StopAllResponse StrikeAndStop(const std::string& scene) {
-    EXPECT_EQ(StrikeLive(scene).accepted_count(), 1U);
-    const auto ringing = [&] {
-      v1::GetMixerResponse mixer;
-      EXPECT_TRUE(Call(*audio, &v1::AudioService::Stub::GetMixer, {}, mixer).ok());
-      return mixer.active_mode_count();
-    };
-    while (ringing() == 0) {
-    }
-    v1::StopAllResponse stopped;
-    EXPECT_TRUE(Call(*scenes, &v1::SceneService::Stub::StopAll, {}, stopped).ok());
-    while (ringing() > 0) {
-    }
-    return stopped;
-  }
-
   /// The records of the stream that `act` sends to a scene.
   template <class Act>
   std::vector<v1::ContactTraceRecord> Recorded(const std::string& scene, Act act) {
@@ -113,10 +70,10 @@ class VolumeApi : public ServedDaemon {
 };
 
 TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSamples) {
-  const std::string other = SceneWithObject(), scene = SceneWithObject();
-  v1::UpdateSceneRequest change;
+  const std::string other = CreateSceneWithObject(), scene = CreateSceneWithObject();
+  auto change = Named<v1::UpdateSceneRequest>(scene);
   change.set_gain(0.5);
-  Update(change, scene);
+  Called(*scenes, &SceneStub::UpdateScene, change);
   const std::vector<v1::ContactTraceRecord> records = ExpectRendersAsHeard(scene, [&] {
     StrikeLive(other);
     StrikeLive(scene);
@@ -131,8 +88,16 @@ TEST_F(VolumeApi, AStemIsTheSceneAloneAndItsRecordedContactsRenderToTheSameSampl
 }
 
 TEST_F(VolumeApi, AfterAStopASceneSoundsBitForBitAsOneThatNeverSounded) {
-  const std::string scene = SceneWithObject();
-  StrikeAndStop(scene);
+  const std::string scene = CreateSceneWithObject();
+  EXPECT_EQ(StrikeLive(scene).accepted_count(), 1U);
+  const auto ringing = [this] {
+    return Called(*audio, &AudioStub::GetMixer, {}).active_mode_count() > 0;
+  };
+  while (!ringing()) {
+  }
+  Called(*scenes, &SceneStub::StopAll, {});
+  while (ringing()) {  // which only the stop ends before the test's time is over
+  }
   ExpectRendersAsHeard(scene, [&] { StrikeLive(scene); });
 }
 
@@ -161,8 +126,7 @@ TEST_F(VolumeApi, BlocksHaveTheSizeAndTheEncodingAskedFor) {
 }
 
 TEST_F(VolumeApi, AWatcherSeesEachBlowAndTheReportsOfTheStreamsOfItsScene) {
-  const std::string scene = SceneWithObject();
-  const std::string other = SceneWithObject();
+  const std::string scene = CreateSceneWithObject(), other = CreateSceneWithObject();
   grpc::ClientContext context;
   v1::WatchContactsRequest request;
   request.set_scene(scene);
@@ -189,14 +153,50 @@ TEST_F(VolumeApi, AWatcherSeesEachBlowAndTheReportsOfTheStreamsOfItsScene) {
   EXPECT_NEAR(blows[0].impulse_newton_seconds().y(), struck.y(), 1e-6);
   EXPECT_NEAR(blows[0].impulse_newton_seconds().z(), struck.z(), 1e-6);
   // Its time is that of the frames of the output.
-  const double rate_hz = output().format().sample_rate_hz;
+  const double rate_hz = output_->format().sample_rate_hz;
   EXPECT_NEAR(blows[0].time_s(), static_cast<double>(last.first_frame()) / rate_hz + 0.25, 1e-6);
   context.TryCancel();
-  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(reader->Finish().error_code(), grpc::CANCELLED);
   grpc::ClientContext missing;
   request.set_scene("scenes/99");
   ExpectRefused(contacts->WatchContacts(&missing, request)->Finish(), grpc::NOT_FOUND,
                 "SCENE_NOT_FOUND");
+}
+
+std::shared_ptr<const v1::ContactTraceRecord> AnyRecord() {
+  return std::make_shared<const v1::ContactTraceRecord>();
+}
+
+TEST(TraceRecorder, TheBytesThatWaitAreBoundedAndFreedWhenTheyAreTooMany) {
+  TraceRecorder recorder(1, [] {});
+  const auto record = AnyRecord();
+  constexpr size_t kQuarter = TraceRecorder::kMostWaitingBytes / 4;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(recorder.Add(record, kQuarter));
+  EXPECT_FALSE(recorder.overflowed());
+  EXPECT_FALSE(recorder.Add(record, 1));
+  EXPECT_TRUE(recorder.overflowed());
+  EXPECT_EQ(record.use_count(), 1);
+  v1::ContactTraceRecord taken;
+  EXPECT_FALSE(recorder.TryTake(taken));
+}
+
+TEST(TraceRecorder, ARecordThatWasTakenNoLongerCounts) {
+  TraceRecorder recorder(1, [] {});
+  v1::ContactTraceRecord taken;
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_TRUE(recorder.Add(AnyRecord(), TraceRecorder::kMostWaitingBytes));
+    EXPECT_TRUE(recorder.TryTake(taken));
+  }
+  EXPECT_FALSE(recorder.overflowed());
+}
+
+TEST(TraceRecorder, KeepsNothingForAClientThatHasGone) {
+  TraceRecorder recorder(1, [] {});
+  const auto record = AnyRecord();
+  EXPECT_TRUE(recorder.Add(record, 1));
+  recorder.Leave();
+  EXPECT_FALSE(recorder.Add(record, 1));
+  EXPECT_EQ(record.use_count(), 1);
 }
 
 }  // namespace

@@ -1,31 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // WatchJobs, and ListJobs with a filter. Every job of this daemon fails.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "tests/server/api/served_daemon.h"
 
 namespace carillon {
 namespace {
 
-using testing::Contains;
-using testing::ElementsAre;
-
 class WatchJobsApi : public ServedDaemon {
  protected:
   using Reader = std::unique_ptr<grpc::ClientReader<v1::WatchJobsResponse>>;
-
-  void Cancel(const std::string& name) {
-    v1::CancelJobRequest request;
-    request.set_name(name);
-    v1::CancelJobResponse response;
-    EXPECT_TRUE(Call(*jobs, &v1::DecompositionService::Stub::CancelJob, request, response).ok());
-  }
 
   /// Reads to the job's end; returns all messages with a job.
   static std::vector<v1::Job> ReadToEndOf(const std::string& name, Reader& reader) {
@@ -40,37 +23,15 @@ class WatchJobsApi : public ServedDaemon {
   }
 
   /// Reads the jobs that wait or run.
-  static std::vector<std::string> ReadBegin(Reader& reader) {
-    std::vector<std::string> names;
+  static void ReadBegin(Reader& reader) {
     v1::WatchJobsResponse response;
-    while (reader->Read(&response) && response.has_job()) names.push_back(response.job().name());
+    while (reader->Read(&response) && response.has_job()) {
+    }
     EXPECT_FALSE(response.has_job());
-    return names;
   }
 
   grpc::ClientContext context_;
 };
-
-TEST_F(WatchJobsApi, TellsOfEachJobFromItsBeginToItsEnd) {
-  Reader reader = jobs->WatchJobs(&context_, {});
-  EXPECT_THAT(ReadBegin(reader), ElementsAre());
-  const std::string first = Submit("first").name();
-  const std::string second = Submit("second").name();
-  const std::vector<v1::Job> read = ReadToEndOf(second, reader);
-  for (const std::string& name : {first, second}) {
-    int last = v1::JOB_STATE_UNSPECIFIED;
-    for (const v1::Job& job : read) {
-      if (job.name() == name) last = job.state();
-    }
-    if (name == second) {
-      EXPECT_EQ(last, v1::JOB_STATE_FAILED);
-    }
-    EXPECT_NE(last, v1::JOB_STATE_UNSPECIFIED) << name;
-  }
-  EXPECT_NE(read.back().error().reason(), "");
-  context_.TryCancel();
-  EXPECT_EQ(reader->Finish().error_code(), grpc::CANCELLED);
-}
 
 TEST_F(WatchJobsApi, SendsOnlyWhatMatches) {
   v1::WatchJobsRequest request;
@@ -81,13 +42,11 @@ TEST_F(WatchJobsApi, SendsOnlyWhatMatches) {
   Submit("bowl");
   Submit("BELL one");
   const std::vector<v1::Job> read = ReadToEndOf(Submit("two bells").name(), reader);
-  std::vector<std::string> labels;
   for (const v1::Job& job : read) {
     EXPECT_EQ(job.state(), v1::JOB_STATE_FAILED);
-    labels.push_back(job.label());
+    EXPECT_NE(job.label(), "bowl");
   }
-  EXPECT_THAT(labels, Contains("two bells"));
-  EXPECT_THAT(labels, testing::Not(Contains("bowl")));
+  EXPECT_EQ(read.back().label(), "two bells");
 }
 
 TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
@@ -98,12 +57,13 @@ TEST_F(WatchJobsApi, EndsForAWatcherThatDoesNotReadAndForNoOther) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   const auto stub = v1::DecompositionService::NewStub(
-      grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), arguments));
+      grpc::CreateCustomChannel(address_, grpc::InsecureChannelCredentials(), arguments));
   v1::CreateModalModelRequest request = RequestFor("a mesh", std::string(200, 'x'));
   Reader reader = stub->WatchJobs(&context_, {});
   for (uint32_t i = 0; i < kSubmitted; ++i) {
     request.mutable_settings()->set_keep_mode_count(1 + i);
-    Cancel(Submit(request).name());
+    const std::string name = Submit(request).name();
+    Called(*jobs, &JobStub::CancelJob, Named<v1::CancelJobRequest>(name));
   }
   uint32_t read_count = 0;
   v1::WatchJobsResponse response;

@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <new>
 #include <string>
 #include <vector>
+
+#include "proto/cpp/error_reason.h"
+#include "server/api/call/status_conversion.h"
 
 namespace carillon {
 namespace {
@@ -61,14 +63,12 @@ class MessageCall final : public Writer {
 
   std::vector<std::string> waiting;
   bool last = false;
-  absl::Status error;
   std::function<void()> while_filling = [] {};
 
  private:
   absl::StatusOr<Supply> Fill(std::string& response) override {
     const bool empty = waiting.empty();
     while_filling();
-    if (!error.ok()) return error;
     if (empty) return last ? Supply::kEnd : Supply::kLater;
     response = waiting.front();
     waiting.erase(waiting.begin());
@@ -116,7 +116,6 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   NumberCall() : StreamReader(nullptr) { StartReading(); }
   std::vector<int> taken;
   bool all_read = false;
-  bool throws = false;
   bool is_gone = false;
 
   /// Receives the number of requests that were read.
@@ -130,7 +129,6 @@ class NumberCall final : public StreamReader<StreamCall<RecordingReactor>, Numbe
   bool gone() const override { return is_gone; }
   absl::Status Take(const Number& request) override {
     if (request.value() > 2) return absl::OutOfRangeError("too large");
-    if (request.value() == 2 && throws) throw std::bad_alloc();
     taken.push_back(request.value());
     return absl::OkStatus();
   }
@@ -155,6 +153,25 @@ TEST(StreamReader, TakesNothingMoreFromAClientThatHasGone) {
   call.ReceiveNext();
   EXPECT_THAT(call.taken, ElementsAre(1));
   EXPECT_THAT(call.ends, ElementsAre(grpc::CANCELLED));
+}
+
+TEST(Legible, WritesControlCharactersAndInvalidBytesInHexadecimal) {
+  EXPECT_EQ(Legible("a\n\x1b[31mb"), "a\\x0a\\x1b[31mb");
+  EXPECT_EQ(Legible("\u202e"), "\\xe2\\x80\\xae");
+  EXPECT_EQ(Legible("x\x80\xc0\xaf\xff"), "x\\x80\\xc0\\xaf\\xff");
+  EXPECT_EQ(Legible("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // a surrogate
+  EXPECT_EQ(Legible("\xe9\x90"), "\\xe9\\x90");
+}
+
+TEST(ToGrpcStatus, FitsIntoTheMetadataOfEveryClient) {
+  std::string input(4'000'000, '\x1b');
+  input += ": give a name";
+  absl::Status refusal = Refusal(absl::StatusCode::kInvalidArgument, "INVALID_NAME", input);
+  AddFigure(refusal, "name", std::string(100'000, 'n'));
+  const grpc::Status status = ToGrpcStatus(refusal);
+  EXPECT_THAT(status.error_message(), testing::StartsWith("INVALID_NAME: "));
+  EXPECT_THAT(status.error_message(), testing::EndsWith(": give a name"));
+  EXPECT_LT(status.error_message().size() + status.error_details().size(), 4096U);
 }
 
 }  // namespace

@@ -208,9 +208,6 @@ TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
   EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
   columns.mutable_partner()->RemoveLast();
   EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: the column partner"));
-  v1::ContactStep step;
-  *step.add_contact_columns() = columns;
-  EXPECT_EQ(Read(step).rejected_count, 5U);  // three objects and two second ones
 }
 
 TEST(ColumnConversion, ADurationBelowZeroIsAbsentAndAStrikerHoldsForAll) {

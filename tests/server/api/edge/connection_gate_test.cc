@@ -13,10 +13,8 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <semaphore>
@@ -26,6 +24,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/api/edge/listen_address.h"
 #include "server/base/clock.h"
 #include "server/base/limited_log.h"
 #include "tests/server/mode_database/sample_model.h"
@@ -66,36 +65,35 @@ std::string AddressWithoutPort(const std::string& peer) {
 
 class ConnectionGateTest : public testing::Test {
  protected:
-  /// Listens on a free port, and lets `count` connections in at a time, of which one address may
-  /// have the share `client_share`.
-  void Open(
-      size_t count, double client_share = 1,
-      const std::function<absl::Status(ConnectionGate&)>& listen = [](ConnectionGate&) {
-        return absl::OkStatus();
-      }) {
+  /// Listens on a free port and on a socket, and lets `count` connections in at a time, of which
+  /// one address may have the share `client_share`.
+  void Open(size_t count, double client_share = 1) {
     gate_.emplace(count, client_share, &log_, AddressWithoutPort);
     auto keeper = std::make_unique<Keeper>(taken_);
     keeper_ = keeper.get();
     address_ = *ParseListenAddress("127.0.0.1:0");
     ASSERT_TRUE(gate_->Listen(address_, std::move(keeper)).ok());
     ASSERT_NE(address_.port, 0);
-    ASSERT_TRUE(listen(*gate_).ok());
-    gate_->Open([this] { ++first_count_; });
+    ASSERT_TRUE(ListenOnSocket(*gate_).ok());
+    gate_->Open([] {});
   }
 
-  static int ConnectUnix(const std::string& path) {
+  absl::Status ListenOnSocket(ConnectionGate& gate) {
+    return gate.Listen(socket_, std::make_unique<Keeper>(taken_));
+  }
+
+  int ConnectUnix() const {
     sockaddr_un name{};
     name.sun_family = AF_UNIX;
-    path.copy(name.sun_path, sizeof(name.sun_path) - 1);
+    socket_.socket_path.copy(name.sun_path, sizeof(name.sun_path) - 1);
     const int made = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     EXPECT_EQ(connect(made, reinterpret_cast<const sockaddr*>(&name), sizeof name), 0);
     return made;
   }
 
   /// Connects from an address of this machine, which is 127.0.0.`host`.
-  int Connect(uint32_t host = 1) const { return Connect(Socket(), host); }
-
-  int Connect(int made, uint32_t host) const {
+  int Connect(uint32_t host = 1) const {
+    const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in from{};
     from.sin_family = AF_INET;
     from.sin_addr.s_addr = htonl(INADDR_LOOPBACK - 1 + host);
@@ -108,7 +106,12 @@ class ConnectionGateTest : public testing::Test {
     return made;
   }
 
-  static int Socket() { return socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0); }
+  /// The same, and waits until the connection has its place.
+  int ConnectTaken(uint32_t host = 1) {
+    const int made = Connect(host);
+    taken_.acquire();
+    return made;
+  }
 
   /// The name that the daemon has for a connection.
   static std::string NameOf(int connection) {
@@ -139,40 +142,19 @@ class ConnectionGateTest : public testing::Test {
   }
 
   SystemClock clock_;
-  std::counting_semaphore<> logged_{0};
   std::vector<std::string> lines_;
-  LimitedLog log_{clock_, "clients", [this](const std::string& line) {
-                    lines_.push_back(line);
-                    logged_.release();
-                  }};
+  LimitedLog log_{clock_, "clients", [this](const std::string& line) { lines_.push_back(line); }};
   std::counting_semaphore<> taken_{0};
   Keeper* keeper_ = nullptr;
-  std::atomic<int> first_count_{0};
+  const TemporaryFolder folder_;
+  ListenAddress socket_{.socket_path = folder_ / "socket", .host = ""};
   ListenAddress address_;
   std::optional<ConnectionGate> gate_;
 };
 
-TEST_F(ConnectionGateTest, ClosesConnectionsBeyondItsLimitAndAcceptsAgainWhenOneHasEnded) {
-  Open(2);
-  for (int i = 0; i < 2; ++i) {
-    Connect();
-    taken_.acquire();
-  }
-  ExpectRefusal(Connect());
-  EndNewest();
-  Connect();
-  taken_.acquire();
-  ExpectRefusal(Connect());
-}
-
 TEST_F(ConnectionGateTest, ForgetsAConnectionWhoseClientHasGone) {
-  const TemporaryFolder folder;
-  const ListenAddress address{.socket_path = folder / "socket", .host = ""};
-  Open(8, 1, [&](ConnectionGate& gate) {
-    ListenAddress listened = address;
-    return gate.Listen(listened, std::make_unique<Keeper>(taken_));
-  });
-  const int made = ConnectUnix(address.socket_path);
+  Open(8);
+  const int made = ConnectUnix();
   taken_.acquire();
   EXPECT_EQ(gate_->open_count(), 1U);
   close(made);
@@ -181,8 +163,7 @@ TEST_F(ConnectionGateTest, ForgetsAConnectionWhoseClientHasGone) {
 
 TEST_F(ConnectionGateTest, EndsAConnectionWhoseDescriptorHasGoneToAnotherFile) {
   Open(4);
-  const int made = Connect();
-  taken_.acquire();
+  const int made = ConnectTaken();
   std::array<int, 2> other{};
   ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, other.data()), 0);
   // As when gRPC closes its descriptor, and somebody opens another file, while the gate looks.
@@ -198,8 +179,7 @@ TEST_F(ConnectionGateTest, ConnectionsThatHaveEndedTakeNoMemory) {
   Open(100000);
   const auto allocated_after = [this](int count) {
     for (int i = 0; i < count; ++i) {
-      const int client = Connect();
-      taken_.acquire();
+      const int client = ConnectTaken();
       EndNewest();
       close(client);
     }
@@ -212,17 +192,10 @@ TEST_F(ConnectionGateTest, ConnectionsThatHaveEndedTakeNoMemory) {
 
 TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) {
   Open(8, 0.25);
-  for (int i = 0; i < 2; ++i) {
-    Connect();
-    taken_.acquire();
-  }
+  for (int i = 0; i < 2; ++i) ConnectTaken();
   for (int i = 0; i < 3; ++i) ExpectRefusal(Connect());
-  Connect(11);  // whose name begins with that of 127.0.0.1
-  taken_.acquire();
-  for (int i = 0; i < 2; ++i) {
-    Connect(2);
-    taken_.acquire();
-  }
+  ConnectTaken(11);  // whose name begins with that of 127.0.0.1
+  for (int i = 0; i < 2; ++i) ConnectTaken(2);
   gate_.reset();
   EXPECT_THAT(lines_, testing::ElementsAre(testing::StartsWith(
                           "refused a new connection from ipv4:127.0.0.1: it has 2 already, its "
@@ -231,10 +204,8 @@ TEST_F(ConnectionGateTest, AnAddressGetsNoMoreThanItsShareAndTheLogNamesItOnce) 
 
 TEST_F(ConnectionGateTest, EndsAConnectionAndRefusesOthersFromTheSameAddress) {
   Open(4);
-  const int first = Connect();
-  taken_.acquire();
-  const int second = Connect();
-  taken_.acquire();
+  const int first = ConnectTaken();
+  const int second = ConnectTaken();
   EXPECT_FALSE(gate_->End("ipv4:127.0.0.1:0"));
   EXPECT_TRUE(gate_->End(NameOf(second)));
   EXPECT_FALSE(gate_->End(NameOf(second)));  // it ends already
@@ -255,41 +226,78 @@ TEST(SourceOfPeer, IsOneForAllConnectionsOfAProcessOrAddress) {
 TEST_F(ConnectionGateTest, AUnixSocketIsItsOwnersUnlessOnlyAGroupMayEnterItsFolder) {
   for (const auto& [folder_mode, socket_mode] :
        {std::pair{0700U, 0600U}, {0755U, 0600U}, {0750U, 0660U}}) {
-    const TemporaryFolder folder;
-    ASSERT_EQ(chmod(folder.path().c_str(), folder_mode), 0);
+    ASSERT_EQ(chmod(folder_.path().c_str(), folder_mode), 0);
     ConnectionGate gate(1);
-    ListenAddress address{.socket_path = folder / "socket", .host = ""};
-    ASSERT_TRUE(gate.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+    ASSERT_TRUE(ListenOnSocket(gate).ok());
     struct stat status {};
-    ASSERT_EQ(stat((folder / "socket").c_str(), &status), 0);
+    ASSERT_EQ(stat(socket_.socket_path.c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0777U, socket_mode);
   }
 }
 
 TEST_F(ConnectionGateTest, RemovesItsSocketAndNoOtherThatTookItsPlace) {
-  const TemporaryFolder folder;
-  ListenAddress address{.socket_path = folder / "socket", .host = ""};
   ConnectionGate second(1);
   {
     ConnectionGate first(1);
-    ASSERT_TRUE(first.Listen(address, std::make_unique<Keeper>(taken_)).ok());
-    ASSERT_EQ(unlink(address.socket_path.c_str()), 0);
-    ASSERT_TRUE(second.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+    ASSERT_TRUE(ListenOnSocket(first).ok());
+    ASSERT_EQ(unlink(socket_.socket_path.c_str()), 0);
+    ASSERT_TRUE(ListenOnSocket(second).ok());
   }
-  EXPECT_TRUE(std::filesystem::exists(address.socket_path));
+  EXPECT_THAT(PrepareSocket(socket_.socket_path).status().ToString(),
+              testing::HasSubstr("LISTEN_FAILED: "));  // a daemon serves it
+  EXPECT_TRUE(std::filesystem::exists(socket_.socket_path));
   second.Close();
-  EXPECT_FALSE(std::filesystem::exists(address.socket_path));
+  EXPECT_FALSE(std::filesystem::exists(socket_.socket_path));
 }
 
 TEST_F(ConnectionGateTest, RefusesAFolderInWhichOthersCouldReplaceTheSocket) {
-  const TemporaryFolder folder;
-  ASSERT_EQ(chmod(folder.path().c_str(), 0777), 0);
+  ASSERT_EQ(chmod(folder_.path().c_str(), 0777), 0);
   ConnectionGate gate(1);
-  ListenAddress address{.socket_path = folder / "socket", .host = ""};
-  const absl::Status status = gate.Listen(address, std::make_unique<Keeper>(taken_));
-  EXPECT_THAT(status.ToString(), testing::HasSubstr("LISTEN_FAILED: "));
-  ASSERT_EQ(chmod(folder.path().c_str(), 01777), 0);  // as /tmp has it
-  EXPECT_TRUE(gate.Listen(address, std::make_unique<Keeper>(taken_)).ok());
+  EXPECT_THAT(ListenOnSocket(gate).ToString(), testing::HasSubstr("LISTEN_FAILED: "));
+  ASSERT_EQ(chmod(folder_.path().c_str(), 01777), 0);  // as /tmp has it
+  EXPECT_TRUE(ListenOnSocket(gate).ok());
+}
+
+TEST(ListenAddress, KeepsWhatItWasGiven) {
+  for (const char* text : {"unix:/run/carillon/socket", "127.0.0.1:50051", "localhost:0",
+                           "[::1]:443", "example.org:65535"}) {
+    const ListenAddress address = *ParseListenAddress(text);
+    EXPECT_EQ(address.ToString(), text);
+  }
+}
+
+TEST(ListenAddress, OnlyThisMachinesOwnAddressesAreLocal) {
+  for (const char* text : {"unix:s", "127.0.0.1:1", "127.8.9.1:1", "localhost:1", "[::1]:1"}) {
+    EXPECT_TRUE(ParseListenAddress(text)->is_local()) << text;
+  }
+  for (const char* text : {"0.0.0.0:1", "[::]:1", "10.0.0.1:1", "localhost.example.org:1"}) {
+    EXPECT_FALSE(ParseListenAddress(text)->is_local()) << text;
+  }
+}
+
+TEST(ListenAddress, RefusesWhatIsNoneAndAPathThatNoClientCouldReach) {
+  for (const std::string& text :
+       {std::string(), std::string("unix:"), std::string("localhost"), std::string(":80"),
+        std::string("host:65536"), std::string("host:-1"), std::string("host:http"),
+        std::string("::1:80"), std::string("[::1:80"), std::string("unix:/").append(107, 'x'),
+        std::string("unix:/tmp/a,b"), std::string("unix:/tmp/a%20b"), std::string("unix:/tmp/a?b"),
+        std::string("unix:/tmp/a#b")}) {
+    const absl::Status status = ParseListenAddress(text).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(status.ToString(), testing::HasSubstr("INVALID_CONFIGURATION: "));
+  }
+  EXPECT_TRUE(ParseListenAddress("unix:/tmp/a b@c:d").ok());
+}
+
+TEST(ListenAddress, KeepsAFileThatIsNoSocket) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "thesis.txt";
+  WriteBytes(file, "years of work");
+  for (const std::filesystem::path& taken : {file, folder.path()}) {
+    EXPECT_THAT(PrepareSocket(taken).status().ToString(),
+                testing::HasSubstr("LISTEN_FAILED: \"" + taken.string()));
+  }
+  EXPECT_EQ(std::filesystem::file_size(file), 13U);
 }
 
 }  // namespace
