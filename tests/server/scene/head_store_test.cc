@@ -12,23 +12,15 @@
 #include <memory>
 #include <numbers>
 #include <span>
-#include <utility>
 #include <vector>
 
-#include "server/synthesis/voice/voice.h"
-#include "tests/server/mode_database/sample_model.h"
+#include "tests/server/synthesis/voice/heard.h"
 
 namespace carillon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr const char* kKemar = "/usr/share/libmysofa/MIT_KEMAR_normal_pinna.sofa";
-
-Vector3 At(double degrees_to_the_right, double degrees_up = 0) {
-  const double azimuth = degrees_to_the_right * kPi / 180, elevation = degrees_up * kPi / 180;
-  return {std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
-          -std::cos(elevation) * std::cos(azimuth)};
-}
 
 std::complex<double> ResponseAt(std::span<const float> taps, double frequency_hz, double rate_hz) {
   const std::complex<double> turn = std::polar(1.0, -2 * kPi * frequency_hz / rate_hz);
@@ -107,26 +99,6 @@ Fit FitTo(const Spectrum& heard, const Spectrum& filter, double rate_hz) {
   return best;
 }
 
-/// A click as both ears hear it from a direction.
-std::array<std::vector<float>, 2> HearClick(std::shared_ptr<const Head> head,
-                                            const Vector3& direction, double rate_hz) {
-  constexpr size_t kBlock = 128;
-  Voice voice({.hearing = {.binaural = true},
-               .sample_rate_hz = rate_hz,
-               .block_frame_count = kBlock,
-               .channel_count = 2,
-               .head = std::move(head)},
-              {.position_m = direction}, {});
-  voice.input()[0] = 1;
-  std::array<std::vector<float>, 2> heard;
-  for (int block = 0; block < 8; ++block) {
-    std::vector<float> frames(2 * kBlock);
-    voice.Render(frames);
-    for (size_t n = 0; n < frames.size(); ++n) heard[n % 2].push_back(frames[n]);
-  }
-  return heard;
-}
-
 TEST(HeadStoreTest, AClickIsHeardThroughTheFiltersOfTheLibrary) {
   for (const uint32_t rate_hz : {44100U, 48000U}) {
     const auto head = *HeadStore(kKemar).Get(rate_hz);
@@ -137,7 +109,8 @@ TEST(HeadStoreTest, AClickIsHeardThroughTheFiltersOfTheLibrary) {
     Fit fit;  // one for all directions and both ears
     for (int degrees = 0; degrees < 360; degrees += 5) {
       const Vector3 at = At(degrees);
-      const auto heard = HearClick(head, at, rate_hz);
+      const Channels heard =
+          Heard({.binaural = true}, {.position_m = at}, 2, head, 128, rate_hz).Play(Click(0, 1024));
       std::array<std::vector<float>, 2> filters;
       for (std::vector<float>& filter : filters) filter.resize(static_cast<size_t>(length));
       std::array<float, 2> delays_s{};

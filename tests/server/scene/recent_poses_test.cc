@@ -63,22 +63,16 @@ TEST_F(RecentPosesTest, ThePointsOfATurningBodyDifferInSpeed) {
   EXPECT_NEAR(*Approach(ray), 0, 1e-9);
 }
 
-TEST_F(RecentPosesTest, TwoBodiesApproachByTheSumOfTheirSpeeds) {
+TEST_F(RecentPosesTest, TwoBodiesApproachByTheSumOfTheirSpeedsAndOneWithoutPosesIsAtRest) {
   for (int step = 1; step <= 5; ++step) {
     BeginAt(step, -0.1 * step);
     poses_.Move(4, 2, {.position_m = {0, 0, 0.05 * step}, .orientation = {.w = 0, .x = 1}});
   }
   // The second body lies on its back, so that its own axis z points down.
-  const std::array<RecentPoses::Ray, 2> rays{kUpwards,
-                                             RecentPoses::Ray{.handle = 4, .direction = {0, 0, 1}}};
-  EXPECT_NEAR(*poses_.ApproachSpeed(rays), 0.15 / kStepS, 1e-9);
-}
-
-TEST_F(RecentPosesTest, ABodyWithoutPosesIsAtRestIfTheOtherHasPoses) {
-  for (int step = 1; step <= 5; ++step) BeginAt(step, -0.1 * step);
+  const RecentPoses::Ray downwards{.handle = 4, .direction = {0, 0, 1}};
   const RecentPoses::Ray fixed{.handle = 9, .direction = {0, 0, -1}};
-  const std::array<RecentPoses::Ray, 2> rays{kUpwards, fixed};
-  EXPECT_NEAR(*poses_.ApproachSpeed(rays), 0.1 / kStepS, 1e-9);
+  EXPECT_NEAR(*poses_.ApproachSpeed(std::array{kUpwards, downwards}), 0.15 / kStepS, 1e-9);
+  EXPECT_NEAR(*poses_.ApproachSpeed(std::array{kUpwards, fixed}), 0.1 / kStepS, 1e-9);
   EXPECT_FALSE(Approach(fixed));
 }
 

@@ -89,7 +89,7 @@ double DeviationDb(std::span<const float> sound, size_t first, size_t stride, co
   double error = 0, peak = 0;
   for (size_t n = first; n < sound.size(); n += stride) {
     const double wanted = right(n);
-    error = std::max(error, std::abs(sound[n] - wanted));
+    error = Larger(error, std::abs(sound[n] - wanted));
     peak = std::max(peak, std::abs(wanted));
   }
   return 20 * std::log10(error / peak);

@@ -259,8 +259,8 @@ double Suddenness(const std::vector<float>& frames, double frequency_hz, double 
   for (size_t n = 1024; n < frames.size(); ++n) {
     const double error = frames[n] + 2 * a * frames[n - 1] + (a * a + 2 * b) * frames[n - 2] +
                          2 * a * b * frames[n - 3] + b * b * frames[n - 4];
-    peak = std::max(peak, std::abs(double{frames[n]}));
-    worst = std::max(worst, std::abs(error));
+    peak = Larger(peak, std::abs(double{frames[n]}));
+    worst = Larger(worst, std::abs(error));
   }
   return 20 * std::log10(worst / peak);
 }

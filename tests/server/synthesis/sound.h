@@ -9,7 +9,7 @@
 
 namespace carillon {
 
-/// The larger value, or the one that is not a number.
+/// The larger value, or the one that is not a number, which std::max would pass over.
 inline double Larger(double a, double b) { return a >= b || std::isnan(a) ? a : b; }
 
 /// The largest magnitude of a sample.

@@ -40,7 +40,7 @@ double LongBlockErrorDb(double frequency_hz, double t60_s, const LongBlock& bloc
   double error = 0;
   for (size_t n = 0; n < frames.size(); ++n) {
     const double right = (start * std::exp(log_q * static_cast<double>(n))).real();
-    error = std::max(error, std::abs(frames[n] - right));
+    error = Larger(error, std::abs(frames[n] - right));
   }
   return 20 * std::log10(error);
 }

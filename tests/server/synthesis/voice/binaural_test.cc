@@ -24,11 +24,6 @@ const std::shared_ptr<const Head>& TheHead() {
   return head;
 }
 
-Vector3 At(double degrees_to_the_right, double distance = 1) {
-  const double angle = degrees_to_the_right * kPi / 180;
-  return {distance * std::sin(angle), 0, -distance * std::cos(angle)};
-}
-
 Channels Play(const HearingSettings& hearing, const Vector3& from, const std::vector<float>& sound,
               const std::function<void(Voice&, size_t)>& at_block = {}, size_t block = 128,
               size_t channels = 2) {
@@ -201,14 +196,11 @@ TEST(BinauralTest, FallsAsleepOnceAllHasArrived) {
   EXPECT_NEAR(energy, whole, 0.02 * whole);
 }
 
-TEST(BinauralTest, OneChannelHasNoEars) {
-  const auto heard = Play({.binaural = true}, At(90), Click(1000, 4096), {}, 128, 1);
+TEST(BinauralTest, OneChannelHasNoEarsAndInTwoTheyReplacePanning) {
+  const std::vector<float> click = Click(1000, 4096);
+  const auto heard = Play({.binaural = true}, At(90), click, {}, 128, 1);
   EXPECT_DOUBLE_EQ(Peak(heard[0]), 1);
   EXPECT_EQ(heard[0], heard[1]);
-}
-
-TEST(BinauralTest, ReplacesPanning) {
-  const std::vector<float> click = Click(1000, 4096);
   EXPECT_EQ(Play({.panning = true, .binaural = true}, At(60), click),
             Play({.binaural = true}, At(60), click));
 }

@@ -19,17 +19,24 @@ namespace carillon {
 
 inline constexpr double kVoiceRateHz = 48000;
 
+/// In front of the listener, at the height of the ears, and so far to the right.
+inline Vector3 At(double degrees_to_the_right, double distance = 1) {
+  const double angle = degrees_to_the_right * std::numbers::pi / 180;
+  return {distance * std::sin(angle), 0, -distance * std::cos(angle)};
+}
+
 using Channels = std::array<std::vector<float>, 2>;
 
 /// A voice that is fed a sound.
 class Heard {
  public:
   Heard(const HearingSettings& hearing, const Place& object, size_t channel_count = 2,
-        std::shared_ptr<const Head> head = nullptr, size_t block_frame_count = 128)
+        std::shared_ptr<const Head> head = nullptr, size_t block_frame_count = 128,
+        double rate_hz = kVoiceRateHz)
       : channel_count_(channel_count),
         block_(block_frame_count),
         voice_({.hearing = hearing,
-                .sample_rate_hz = kVoiceRateHz,
+                .sample_rate_hz = rate_hz,
                 .block_frame_count = block_frame_count,
                 .channel_count = channel_count,
                 .head = std::move(head)},

@@ -18,6 +18,7 @@ namespace {
 constexpr double kRate = kVoiceRateHz;
 constexpr double kSpeed = 343;
 constexpr double kPi = std::numbers::pi;
+constexpr HearingSettings kAll{.distance_gain = true, .propagation_delay = true, .panning = true};
 
 /// Measures the frequency by the zeros that the sound crosses upwards in [begin, end).
 double FrequencyHz(const std::vector<float>& sound, size_t begin, size_t end) {
@@ -36,7 +37,7 @@ double LargestClick(const std::vector<float>& sound, double frequency_hz, size_t
   const double c = 2 * std::cos(2 * kPi * frequency_hz / kRate);
   double largest = 0;
   for (size_t n = begin + 1; n + 1 < sound.size(); ++n) {
-    largest = std::max(largest, std::abs(sound[n + 1] + sound[n - 1] - c * sound[n]));
+    largest = Larger(largest, std::abs(sound[n + 1] + sound[n - 1] - c * sound[n]));
   }
   return largest;
 }
@@ -152,8 +153,7 @@ TEST(Voice, AListenerWhoMovesHearsTheDopplerFactorOfAMovingReceiver) {
 }
 
 TEST(Voice, AnObjectThatCirclesCloselyDoesNotClick) {
-  const HearingSettings all{.distance_gain = true, .propagation_delay = true, .panning = true};
-  Heard heard(all, {.position_m = {1, 0, 0}});
+  Heard heard(kAll, {.position_m = {1, 0, 0}});
   // Half a metre from the listener at its nearest, at 6 m/s.
   const auto position = [](double t) -> std::array<double, 3> {
     return {1.5 * std::cos(4 * t) - 0.5, 0, 1.5 * std::sin(4 * t)};
@@ -168,8 +168,7 @@ TEST(Voice, AnObjectThatCirclesCloselyDoesNotClick) {
 }
 
 TEST(Voice, AJumpIsAFade) {
-  const HearingSettings all{.distance_gain = true, .propagation_delay = true, .panning = true};
-  Heard heard(all, {.position_m = {1, 0, 0}});
+  Heard heard(kAll, {.position_m = {1, 0, 0}});
   const auto jump = [](Voice& voice, size_t frame) {
     if (frame == 375 * 128) voice.Move(MotionTo({-20, 3, 1}, 0), 5);
   };
