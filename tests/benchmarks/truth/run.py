@@ -12,6 +12,8 @@ import pathlib
 import sys
 import tempfile
 
+import numpy
+
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 import bench  # noqa: E402
 import bar  # noqa: E402
@@ -19,9 +21,37 @@ import drops  # noqa: E402
 import likeness  # noqa: E402
 import loudness  # noqa: E402
 import materials  # noqa: E402
-import pictures  # noqa: E402
 import programs  # noqa: E402
 import rings  # noqa: E402
+
+WINDOW, RANGE_DB = 512, 70
+QUIETEST_DB = -160  # a sound whose loudest point is below it stays black
+
+
+def draw(sounds, path, seconds, columns=4):
+    """Draws the spectrogram of each of [(title, samples)], on a scale of its own loudest point, to a PNG file."""
+    pyplot = bench.pyplot()
+    rows = math.ceil(len(sounds) / columns)
+    figure, axes = pyplot.subplots(rows, columns, figsize=(3.1 * columns, 2.1 * rows), sharex=True, sharey=True,
+                                   squeeze=False)
+    for axis in axes.flat[len(sounds):]:
+        axis.axis("off")
+    for axis, (title, samples) in zip(axes.flat, sounds):
+        shown = numpy.zeros(int(seconds * rings.RATE_HZ))
+        shown[:min(len(shown), len(samples))] = samples[:len(shown)]
+        noise = 1e-12 * numpy.random.default_rng(1).standard_normal(len(shown))  # no logarithm of zero
+        power, _, _, image = axis.specgram(shown + noise, WINDOW, rings.RATE_HZ, noverlap=3 * WINDOW // 4,
+                                           cmap="inferno")
+        loudest = max(10 * numpy.log10(power.max()), QUIETEST_DB)
+        image.set_clim(loudest - RANGE_DB, loudest)
+        axis.set_title(title, fontsize=8)
+        axis.set_ylim(0, 20000)
+        axis.set_yticks(range(0, 20001, 5000), [f"{khz} kHz" for khz in range(0, 21, 5)], fontsize=7)
+        axis.tick_params(axis="x", labelsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=90)
+    pyplot.close(figure)
+    print(f"drawn: {path}\n")
 
 
 def print_table(lines):
@@ -91,7 +121,7 @@ def show_bar(options):
             results.append(bar.measure(studio, recording, variant))
             print(result_line(results[-1], recorded), flush=True)
         print()
-    pictures.draw([("recording", recording)] + [(result.name, result.sound) for result in results],
+    draw([("recording", recording)] + [(result.name, result.sound) for result in results],
                   options.pictures / "bar.png", bar.SPAN_S)
 
 
@@ -128,7 +158,7 @@ def show_drops(options):
     print()
     print_table([*materials.head("body", "mass, g", "energy of the corner at the first contact, J", "radiated, J",
                                  "radiated, %"), *energies])
-    pictures.draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
+    draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
 
 
 if __name__ == "__main__":
