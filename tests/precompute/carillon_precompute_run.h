@@ -8,12 +8,15 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <xxhash.h>
 
 #include <array>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -27,13 +30,69 @@ using Json = nlohmann::json;
 
 inline constexpr char kSteel[] = " --young 210e9 --poisson 0.3 --density 7850";
 
-inline void WriteBox(const std::string& path, const Point& sides) {
+/// A box as OBJ, from `low`, in a file that has `before` vertices already.
+inline void AppendBox(std::ofstream& file, const Point& sides, const Point& low, int before) {
   const SurfaceMesh box = MakeBoxSurface(sides);
-  std::ofstream file(path);
-  for (const auto& [x, y, z] : box.vertices) file << "v " << x << " " << y << " " << z << "\n";
-  for (const auto& [a, b, c] : box.triangles) {
-    file << "f " << a + 1 << " " << b + 1 << " " << c + 1 << "\n";
+  for (const auto& [x, y, z] : box.vertices) {
+    file << "v " << low[0] + x << " " << low[1] + y << " " << low[2] + z << "\n";
   }
+  for (const auto& [a, b, c] : box.triangles) {
+    file << "f " << a + 1 + before << " " << b + 1 + before << " " << c + 1 + before << "\n";
+  }
+}
+
+inline void WriteBox(const std::string& path, const Point& sides) {
+  std::ofstream file(path);
+  AppendBox(file, sides, {0, 0, 0}, 0);
+}
+
+/// The messages of a file, one after the other.
+template <typename Message>
+std::vector<Message> ReadMessages(const std::string& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY);
+  google::protobuf::io::FileInputStream file(descriptor);
+  std::vector<Message> messages;
+  Message message;
+  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&message, &file, nullptr)) {
+    messages.push_back(message);
+  }
+  close(descriptor);
+  return messages;
+}
+
+inline std::vector<v1::ModalModelRecord> ReadRecords(const std::string& path) {
+  return ReadMessages<v1::ModalModelRecord>(path);
+}
+
+/// A stored model or transfer: its header, and the bytes of each array, whose hashes were checked.
+template <typename Header>
+struct Stored {
+  Header header;
+  std::map<std::string, std::string> arrays;
+
+  template <typename T>
+  std::vector<T> Values(const std::string& name) const {
+    const std::string& bytes = arrays.at(name);
+    std::vector<T> values(bytes.size() / sizeof(T));
+    std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  }
+};
+
+template <typename Header, typename Record>
+Stored<Header> ReadStored(const std::string& path) {
+  Stored<Header> stored;
+  for (const Record& record : ReadMessages<Record>(path)) {
+    if (record.has_header()) stored.header = record.header();
+    if (!record.has_chunk()) continue;
+    const v1::ModalModelChunk& chunk = record.chunk();
+    EXPECT_LE(chunk.data().size(), size_t{1} << 20);
+    EXPECT_EQ(chunk.xxh3(), XXH3_64bits(chunk.data().data(), chunk.data().size()));
+    const auto& array = stored.header.arrays(static_cast<int>(chunk.array()));
+    EXPECT_EQ(chunk.offset(), stored.arrays[array.name()].size());
+    stored.arrays[array.name()] += chunk.data();
+  }
+  return stored;
 }
 
 /// Runs the program as users do: a process, its options, its output and its exit status.
@@ -63,11 +122,16 @@ struct CarillonPrecomputeTest : ::testing::Test {
     return result;
   }
 
-  /// Decomposes the bar: linear and small.
-  Result RunBar(const std::string& options) const {
-    return Run(bar + " --out " + model + " --unit mm --element linear --nodes 100 --json " +
-               options);
+  /// What a run that must end well prints as JSON.
+  Json Report(const std::string& options) const {
+    const Result result = Run(options + " --json");
+    EXPECT_EQ(result.exit_status, 0) << result.output;
+    return Json::parse(result.output);
   }
+
+  /// Decomposes the bar: linear and small.
+  Result RunBar(const std::string& options) const { return Run(small_bar + " --json " + options); }
+  Json ReportOfBar(const std::string& options) const { return Report(small_bar + options); }
 
   /// The reason of a refusal, checked to be given in every way.
   std::string ReasonOf(const Result& result) const {
@@ -88,18 +152,8 @@ struct CarillonPrecomputeTest : ::testing::Test {
   std::string folder = ::testing::TempDir() + "/carillon_precompute_" + std::to_string(getpid());
   std::string bar = folder + "/bar.obj";
   std::string model = folder + "/bar.modes";
+  std::string small_bar =
+      bar + " --out " + model + " --unit mm --element linear --nodes 100" + kSteel + " ";
 };
-
-inline std::vector<v1::ModalModelRecord> ReadRecords(const std::string& path) {
-  const int descriptor = open(path.c_str(), O_RDONLY);
-  google::protobuf::io::FileInputStream file(descriptor);
-  std::vector<v1::ModalModelRecord> records;
-  v1::ModalModelRecord record;
-  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &file, nullptr)) {
-    records.push_back(record);
-  }
-  close(descriptor);
-  return records;
-}
 
 }  // namespace carillon::precompute

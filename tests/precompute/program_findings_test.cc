@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
 // What the program warns of, refuses and advises, as users see it.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -25,10 +22,10 @@ using ProgramFindingsTest = CarillonPrecomputeTest;
 // A bar of 12 triangles has elements as long as itself, whose first modes are off by 20 %.
 TEST_F(ProgramFindingsTest, AMeshOfFewElementsIsComparedWithAFinerOne) {
   WriteBox(bar, {500, 20, 10});
-  const std::string options = bar + " --out " + model + " --unit mm --json" + kSteel;
-  const Json fine = Json::parse(Run(options).output).at("modes");
+  const std::string options = bar + " --out " + model + " --unit mm" + kSteel;
+  const Json fine = Report(options).at("modes");
   for (const char* few : {" --keep-surface", " --nodes 3", " --nodes 60"}) {
-    const Json report = Json::parse(Run(options + few).output);
+    const Json report = Report(options + few);
     EXPECT_THAT(report.at("warnings").dump(), HasSubstr("too few elements"));
     const Json& modes = report.at("modes");
     ASSERT_LT(modes.size(), fine.size());
@@ -82,27 +79,17 @@ TEST_F(ProgramFindingsTest, ALargeBodyIsMadeOfMetresOnlyIfTheUnitIsStated) {
 
 // Two closed boxes in a row, which share a face, and the one box that they are together.
 TEST_F(ProgramFindingsTest, PartsThatShareAFaceAreOneBodyOfOneMaterial) {
-  const std::string options = " --out " + model + " --unit mm --nodes 300 --json";
   const auto first_hz = [&] {
-    const Result made = Run(bar + options + kSteel);
-    EXPECT_EQ(made.exit_status, 0) << made.output;
+    const Json report = Report(bar + " --out " + model + " --unit mm --nodes 300" + kSteel);
     std::filesystem::remove(model);
-    return Json::parse(made.output).at("modes")[0].at("frequency_hz").get<double>();
+    return report.at("modes")[0].at("frequency_hz").get<double>();
   };
   WriteBox(bar, {200, 16, 10});
   const double whole_hz = first_hz();
   std::ofstream file(bar);
   for (int part = 0; part < 2; ++part) {
     file << "o part" << part << "\nusemtl colour" << part << "\n";
-    const SurfaceMesh box = MakeBoxSurface({100, 16, 10});
-    for (const auto& [x, y, z] : box.vertices) {
-      file << "v " << x + 100 * part << " " << y << " " << z << "\n";
-    }
-    const auto count = static_cast<int>(box.vertices.size());
-    for (const auto& [a, b, c] : box.triangles) {
-      file << "f " << a + 1 + count * part << " " << b + 1 + count * part << " "
-           << c + 1 + count * part << "\n";
-    }
+    AppendBox(file, {100, 16, 10}, {100.0 * part, 0, 0}, 8 * part);
   }
   file.close();
   EXPECT_NEAR(first_hz() / whole_hz, 1, 0.005) << "the estimated errors";
@@ -129,7 +116,7 @@ TEST_F(ProgramFindingsTest, ASlenderBodyIsRefusedAsSlender) {
 
 TEST_F(ProgramFindingsTest, OnlyRemediesThatHelpAnOpenSurfaceAreOffered) {
   const auto options_of = [&] {
-    const Result result = RunBar(kSteel);
+    const Result result = RunBar("");
     EXPECT_EQ(ReasonOf(result), "MESH_NOT_CLOSED");
     std::vector<std::string> options;
     const Json error = Json::parse(result.output).at("error");

@@ -109,28 +109,33 @@ SurfaceMesh MakeBoxSurface(const Point& size_m) {
   return BoundarySurface(MakeTetBox(size_m, {1, 1, 1}, 4));
 }
 
+SurfaceMesh InFour(const SurfaceMesh& mesh) {
+  SurfaceMesh finer{.vertices = mesh.vertices, .triangles = {}};
+  std::map<std::pair<int32_t, int32_t>, int32_t> middle_of_edge;
+  const auto middle = [&](int32_t a, int32_t b) {
+    const auto [found, is_new] =
+        middle_of_edge.try_emplace(std::minmax(a, b), static_cast<int32_t>(finer.vertices.size()));
+    if (is_new) {
+      const Point p = mesh.vertices[static_cast<size_t>(a)];
+      const Point q = mesh.vertices[static_cast<size_t>(b)];
+      finer.vertices.push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2});
+    }
+    return found->second;
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const int32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    finer.triangles.insert(finer.triangles.end(),
+                           {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+  }
+  return finer;
+}
+
 SurfaceMesh MakeSphereSurface(double radius_m, int halvings) {
   SurfaceMesh sphere{
       {{1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
       {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
   for (int halving = 0; halving < halvings; ++halving) {
-    std::map<std::pair<int32_t, int32_t>, int32_t> middle_of_edge;
-    const auto middle = [&](int32_t a, int32_t b) {
-      const auto [found, is_new] = middle_of_edge.try_emplace(
-          std::minmax(a, b), static_cast<int32_t>(sphere.vertices.size()));
-      if (is_new) {
-        const Point p = sphere.vertices[static_cast<size_t>(a)];
-        const Point q = sphere.vertices[static_cast<size_t>(b)];
-        sphere.vertices.push_back({p[0] + q[0], p[1] + q[1], p[2] + q[2]});
-      }
-      return found->second;
-    };
-    std::vector<std::array<int32_t, 3>> finer;
-    for (const auto& [a, b, c] : sphere.triangles) {
-      const int32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
-      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-    }
-    sphere.triangles = std::move(finer);
+    sphere = InFour(sphere);
     for (Point& p : sphere.vertices) {
       const double length = std::hypot(p[0], p[1], p[2]);
       for (double& x : p) x /= length;

@@ -40,6 +40,9 @@ TetMesh MakeTetBox(const Point& size_m, const std::array<int, 3>& cells, int nod
 /// that no tetrahedron has are left out.
 TetMesh Part(const TetMesh& mesh, const std::function<bool(const Point&)>& kept);
 
+/// Each triangle in four, at the middles of its edges.
+SurfaceMesh InFour(const SurfaceMesh& mesh);
+
 /// A sphere about the origin: an octahedron whose edges are halved `halvings` times.
 SurfaceMesh MakeSphereSurface(double radius_m, int halvings);
 

@@ -1,107 +1,37 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
 // carillon-precompute --transfer as users run it, and the file that it writes.
-#include <fcntl.h>
-#include <google/protobuf/io/zero_copy_stream_impl.h>
-#include <google/protobuf/util/delimited_message_util.h>
-#include <gtest/gtest.h>
-#include <unistd.h>
-#include <xxhash.h>
-
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "carillon/v1/transfer.pb.h"
 #include "proto/cpp/transfer_format.h"
-#include "tests/precompute/test_meshes.h"
+#include "tests/precompute/carillon_precompute_run.h"
 
 namespace carillon::precompute {
 namespace {
 
-using Json = nlohmann::json;
-
 constexpr double kDensity = 7850, kYoung = 210e9, kSize = 2;
 constexpr char kUse[] = " --young 210e9 --poisson 0.3 --density 7850 --size 2 --band 20:8000 ";
 
-/// A stored transfer: its header, and the bytes of each array, whose hashes were checked.
-struct StoredTransfer {
-  v1::TransferHeader header;
-  std::map<std::string, std::string> arrays;
-
-  template <typename T>
-  std::vector<T> Values(const std::string& name) const {
-    const std::string& bytes = arrays.at(name);
-    std::vector<T> values(bytes.size() / sizeof(T));
-    std::memcpy(values.data(), bytes.data(), bytes.size());
-    return values;
-  }
-};
-
-StoredTransfer ReadTransfer(const std::string& path) {
-  const int descriptor = open(path.c_str(), O_RDONLY);
-  google::protobuf::io::FileInputStream file(descriptor);
-  StoredTransfer stored;
-  v1::TransferRecord record;
-  while (google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &file, nullptr)) {
-    if (record.has_header()) stored.header = record.header();
-    if (!record.has_chunk()) continue;
-    const v1::ModalModelChunk& chunk = record.chunk();
-    EXPECT_EQ(chunk.xxh3(), XXH3_64bits(chunk.data().data(), chunk.data().size()));
-    const auto& array = stored.header.arrays(static_cast<int>(chunk.array()));
-    EXPECT_EQ(chunk.offset(), stored.arrays[array.name()].size());
-    stored.arrays[array.name()] += chunk.data();
-  }
-  close(descriptor);
-  return stored;
+Stored<v1::TransferHeader> ReadTransfer(const std::string& path) {
+  return ReadStored<v1::TransferHeader, v1::TransferRecord>(path);
 }
 
-/// A bar of 100 x 20 x 12 mm of steel, twice as large, decomposed with its radiation.
-struct TransferFileTest : ::testing::Test {
-  TransferFileTest() {
-    std::filesystem::create_directories(folder);
-    const SurfaceMesh box = MakeBoxSurface({0.1, 0.02, 0.012});
-    std::ofstream file(folder + "/bar.obj");
-    for (const auto& [x, y, z] : box.vertices) file << "v " << x << " " << y << " " << z << "\n";
-    for (const auto& [a, b, c] : box.triangles) {
-      file << "f " << a + 1 << " " << b + 1 << " " << c + 1 << "\n";
-    }
+struct TransferFileTest : CarillonPrecomputeTest {
+  /// Decomposes the bar of steel, twice as large, with its radiation.
+  Json Transfer(const std::string& options) const {
+    return Report(bar + " --out " + model + " --unit mm --nodes 150 --transfer" + kUse + options);
   }
-  ~TransferFileTest() override { std::filesystem::remove_all(folder); }
-
-  Json Run(const std::string& options) const {
-    return Execute(folder + "/bar.obj --out " + folder + "/bar.modes --nodes 150 --transfer" +
-                   kUse + options);
-  }
-
-  /// What the program prints, as an object.
-  static Json Execute(const std::string& options) {
-    const std::string command =
-        std::string(CARILLON_PRECOMPUTE) + " " + options + " --json 2> /dev/null";
-    std::FILE* pipe = popen(command.c_str(), "r");
-    std::string output;
-    std::array<char, 4096> buffer;
-    while (const size_t count = std::fread(buffer.data(), 1, buffer.size(), pipe)) {
-      output.append(buffer.data(), count);
-    }
-    Json report = Json::parse(output);
-    EXPECT_EQ(pclose(pipe) == 0, !report.contains("error"));
-    return report;
-  }
-
-  std::string folder = ::testing::TempDir() + "/carillon_transfer_" + std::to_string(getpid());
 };
 
-TEST_F(TransferFileTest, HoldsWhatTheReportSays) {
-  const Json report = Run("");
-  const StoredTransfer stored = ReadTransfer(folder + "/bar.modes.transfer");
+TEST_F(TransferFileTest, HoldsWhatTheReportSaysAndTheMassAndRigidMotionsOfTheBody) {
+  const Json report = Transfer("");
+  const auto stored = ReadTransfer(model + ".transfer");
   const auto& header = stored.header;
   EXPECT_EQ(header.format_version(), 1U);
   EXPECT_EQ(header.mesh_digest().size(), 64U);
@@ -129,33 +59,7 @@ TEST_F(TransferFileTest, HoldsWhatTheReportSays) {
                     (1.204 * omega * omega * std::sqrt(true_integral / (4 * std::numbers::pi))),
                 1, 1e-4);
   }
-}
 
-// Unit material: k = s sqrt(Lambda) is size times the wavenumber of the body as it sounds.
-TEST_F(TransferFileTest, KeepsThePowerOfEachModeInItsHarmonics) {
-  const Json report = Run("--transfer-out " + folder + "/elsewhere");
-  const StoredTransfer stored = ReadTransfer(folder + "/elsewhere");
-  const auto power = stored.Values<float>("power_integrals");
-  const auto first = stored.Values<uint32_t>("first");
-  const auto harmonics = stored.Values<uint32_t>("harmonics");
-  const auto coefficients = stored.Values<float>("coefficients");
-  ASSERT_EQ(first.size(), power.size() + 1);
-  ASSERT_EQ(first.back(), harmonics.size());
-  ASSERT_EQ(coefficients.size(), 2 * harmonics.size());
-  for (size_t m = 0; m < power.size(); ++m) {
-    const double frequency_hz = report.at("modes")[m].at("frequency_hz");
-    const double k = kSize * 2 * std::numbers::pi * frequency_hz / 343;
-    double sum = 0;
-    for (size_t i = 2 * first[m]; i < 2 * first[m + 1]; ++i) {
-      sum += coefficients[i] * coefficients[i];
-    }
-    EXPECT_NEAR(sum / (k * k * power[m]), 1, 1e-4);
-  }
-}
-
-TEST_F(TransferFileTest, HoldsTheMassOfTheBodyAndItsRigidMotions) {
-  Run("");
-  const StoredTransfer stored = ReadTransfer(folder + "/bar.modes.transfer");
   const auto& body = stored.header.rigid_body();
   EXPECT_NEAR(body.volume_m3() / (0.1 * 0.02 * 0.012), 1, 1e-4);
   EXPECT_NEAR(body.center_of_mass_m().x(), 0.05, 1e-5);
@@ -174,23 +78,49 @@ TEST_F(TransferFileTest, HoldsTheMassOfTheBodyAndItsRigidMotions) {
   EXPECT_GT(dipole(1, 1), dipole(0, 3));
 }
 
+// Unit material: k = s sqrt(Lambda) is size times the wavenumber of the body as it sounds.
+TEST_F(TransferFileTest, KeepsThePowerOfEachModeInItsHarmonics) {
+  const Json report = Transfer("--transfer-out " + folder + "/elsewhere");
+  const auto stored = ReadTransfer(folder + "/elsewhere");
+  const auto power = stored.Values<float>("power_integrals");
+  const auto first = stored.Values<uint32_t>("first");
+  const auto harmonics = stored.Values<uint32_t>("harmonics");
+  const auto orders = stored.Values<uint32_t>("orders");
+  const auto coefficients = stored.Values<float>("coefficients");
+  ASSERT_EQ(first.size(), power.size() + 1);
+  ASSERT_EQ(first.back(), harmonics.size());
+  ASSERT_EQ(coefficients.size(), 2 * harmonics.size());
+  for (size_t m = 0; m < power.size(); ++m) {
+    const double frequency_hz = report.at("modes")[m].at("frequency_hz");
+    const double k = kSize * 2 * std::numbers::pi * frequency_hz / 343;
+    double sum = 0;
+    for (size_t i = 2 * first[m]; i < 2 * first[m + 1]; ++i) {
+      sum += coefficients[i] * coefficients[i];
+    }
+    EXPECT_NEAR(sum / (k * k * power[m]), 1, 1e-5);
+    ASSERT_LT(first[m], first[m + 1]);
+    const std::span kept = std::span(harmonics).subspan(first[m], first[m + 1] - first[m]);
+    EXPECT_TRUE(std::ranges::is_sorted(kept));
+    EXPECT_LT(kept.back(), (orders[m] + 1) * (orders[m] + 1));
+  }
+}
+
 TEST_F(TransferFileTest, SaysWhatItsBudgetLeftOut) {
-  const Json report = Run("--transfer-budget 0.001");
+  const Json report = Transfer("--transfer-budget 0.001");
   EXPECT_EQ(report.at("radiation").at("modes_computed"), 0);
   EXPECT_FALSE(report.at("modes")[0].at("radiation").at("computed").get<bool>());
-  const StoredTransfer stored = ReadTransfer(folder + "/bar.modes.transfer");
+  const auto stored = ReadTransfer(model + ".transfer");
   EXPECT_EQ(stored.header.warnings_size(), 1);
   EXPECT_EQ(stored.Values<float>("power_integrals")[0], 0);
   EXPECT_EQ(stored.Values<uint32_t>("states")[0], 2U);
 }
 
 TEST_F(TransferFileTest, IsTheSameWhetherTheModesAreComputedOrStored) {
-  Run("--transfer-budget 1000");
+  Transfer("--transfer-budget 1000");
   const std::string apart = folder + "/apart";
-  const Json report =
-      Execute(folder + "/bar.modes --radiate --out " + apart + kUse + "--transfer-budget 1000");
-  const StoredTransfer together = ReadTransfer(folder + "/bar.modes.transfer");
-  const StoredTransfer stored = ReadTransfer(apart);
+  const Json report = Report(model + " --radiate --out " + apart + kUse + "--transfer-budget 1000");
+  const auto together = ReadTransfer(model + ".transfer");
+  const auto stored = ReadTransfer(apart);
   EXPECT_TRUE(stored.arrays == together.arrays);
   EXPECT_EQ(stored.header.mesh_digest(), together.header.mesh_digest());
   EXPECT_EQ(stored.header.settings().SerializeAsString(),

@@ -9,7 +9,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -41,24 +40,6 @@ T ValueOrExit(absl::StatusOr<T> result) {
   std::exit(EXIT_FAILURE);
 }
 
-/// The far pattern that the harmonics kept of a mode give.
-ModeField FieldOf(const ModeRadiation& mode, const SphereGrid& grid) {
-  ModeField field;
-  field.power_integral = mode.power_integral;
-  for (const Point& direction : grid.directions()) {
-    const std::vector<double> harmonics = RealHarmonics(mode.order, direction);
-    std::complex<double> sum = 0;
-    for (size_t i = 0; i < mode.index.size(); ++i) {
-      const auto l = static_cast<int>(std::sqrt(static_cast<double>(mode.index[i])));
-      const std::complex<double> turn = std::pow(std::complex<double>(0, -1), l + 1);
-      sum +=
-          turn / mode.wavenumber * std::complex<double>(mode.value[i]) * harmonics[mode.index[i]];
-    }
-    field.pattern.push_back(sum);
-  }
-  return field;
-}
-
 class Reference {
  public:
   Reference(const SurfaceModes& modes, const Transfer& transfer)
@@ -76,7 +57,9 @@ class Reference {
     const RemeshedSurface& surface = ValueOrExit(levels_.At(level))->level;
     const ModeField fine =
         SolveRadiation(ProblemOf(number, surface), surface, body_, grid, workers_).front();
-    const ModeField stored = FieldOf(mode, grid);
+    ModeField stored;
+    stored.power_integral = mode.power_integral;
+    stored.pattern = KeptPattern(mode, grid);
     return {{"vertices", mode.vertex_count},
             {"finer_vertices", surface.surface.vertex_count()},
             {"efficiency", mode.efficiency()},

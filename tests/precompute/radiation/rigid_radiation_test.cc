@@ -74,10 +74,7 @@ TEST(RigidMotions, OfASphereAreThoseOfTheClosedForm) {
     }
     EXPECT_LT(found.error_db, 0.2);
   }
-}
-
-TEST(RigidMotions, RotationOfASphereMovesNoAir) {
-  const RigidRadiation rigid = Solve(MakeIcosphere(1, 3));
+  // Its rotation moves no air.
   for (size_t motion = 3; motion < 6; ++motion) {
     for (size_t w = 0; w < rigid.wavenumbers.size(); ++w) {
       EXPECT_LT(rigid.motions[motion].power_integrals[w],

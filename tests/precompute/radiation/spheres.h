@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <complex>
-#include <utility>
-
 #include "precompute/mesh/surface_mesh.h"
 #include "precompute/radiation/boundary_operator.h"
 
@@ -12,9 +9,6 @@ namespace carillon::precompute {
 /// An icosahedron whose triangles are cut in four `halvings` times, about the origin, with the
 /// volume of a sphere of this radius: 10 * 4^halvings + 2 vertices.
 SurfaceMesh MakeIcosphere(double radius_m, int halvings);
-
-/// The spherical Hankel function of the first kind h_l(x), and its derivative.
-std::pair<std::complex<double>, std::complex<double>> SphericalHankel(int l, double x);
 
 /// The power integral that a sphere of this radius radiates where it moves along its normals by
 /// Y_lm: p = h_l(k r)/(k h_l'(k a)) Y_lm, so that I = 1/(k^4 |h_l'(k a)|^2).
