@@ -131,10 +131,16 @@ class DatabaseCommandsTest(ScratchTest):
         self.assertEqual(backup.read_bytes(), before)
         self.assertEqual(sorted(self.folder.iterdir()), files)
 
-    def test_a_backup_goes_into_pipes_and_not_over_the_database_of_a_daemon(self):
+    def test_a_backup_goes_into_pipes_and_names_what_it_cannot_write(self):
         piped = self.daemon.command("db", "backup", "/dev/stdout", text=False)
         self.assertEqual(piped.stdout[:16], b"SQLite format 3\0")
-        self.assertEqual(self.daemon.refusal("db", "backup", self.folder / "data/carillon.db"), "OUTPUT_NOT_WRITABLE")
+        for target, why in ((self.folder / "data/carillon.db", "belongs to the database of a daemon"),
+                            (self.folder, "it is a folder"), ("/dev/full", "No space left on device"),
+                            (self.folder / "none/backup.db", f"the folder {self.folder}/none does not exist")):
+            with self.subTest(target=target):
+                refused = self.daemon.command("db", "backup", target, check=False)
+                self.assertEqual(refused.returncode, 1)
+                self.assertRegex(refused.stderr, f"OUTPUT_NOT_WRITABLE: {target} .*{why}")
 
     def test_check_finds_a_flipped_bit(self):
         self.daemon.stop()
