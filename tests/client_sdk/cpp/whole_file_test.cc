@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-/// tests/integration/commands/test_database_commands.py writes, replaces and refuses other files.
+/// tests/integration/commands/test_database_commands.py writes and replaces whole files.
 class WholeFileTest : public testing::Test {
  protected:
   void SetUp() override { fs::create_directory(folder_); }
@@ -75,6 +75,14 @@ TEST_F(WholeFileTest, WritesAtOnceIntoAFileThatIsOpen) {
   EXPECT_THAT(Refused(folder_ / "link"), HasSubstr("OUTPUT_NOT_WRITABLE: "));
   EXPECT_EQ(TextOf(file_), expected);
   close(descriptor);
+}
+
+TEST_F(WholeFileTest, SaysWhyItCannotBeWritten) {
+  EXPECT_THAT(Refused(folder_), HasSubstr("OUTPUT_NOT_WRITABLE: "));
+  EXPECT_THAT(Refused(folder_ / "none/a"), HasSubstr("/none does not exist"));
+  absl::StatusOr<WholeFile> full = WholeFile::Create("/dev/full");
+  ASSERT_TRUE(full.ok()) << full.status();
+  EXPECT_THAT(full->Write("a copy").ToString(), HasSubstr("No space left on device"));
 }
 
 }  // namespace
