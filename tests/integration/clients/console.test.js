@@ -84,7 +84,7 @@ test('only a browser that has shown the token is let in, and of 200 strangers no
     [403, () => upgrade({ cookie: mine, origin: origin.replace('http', 'https') })],
     [403, () => upgrade({ cookie: `${name}=${wrong()}`, origin })],
     [403, () => upgrade({ cookie: `${name}=${value}0`, origin })],
-    [421, () => upgrade({ cookie: mine, origin: `http://${wrong()}.example`, host: `${wrong()}.example` })],
+    [403, () => upgrade({ cookie: mine, origin: `http://${wrong()}.example`, host: `${wrong()}.example` })],
   ];
   for (let i = 0; i < 200; i += 1) {
     const [expected, attempt] = strangers[i % strangers.length];
