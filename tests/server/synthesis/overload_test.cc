@@ -62,6 +62,7 @@ class TestClock final : public Clock {
 
 std::unique_ptr<OscillatorBank> MakeLargeBank(double coupling = 1) {
   std::vector<SoundingMode> modes;
+  modes.reserve(160);
   for (uint32_t m = 0; m < 160; ++m) modes.push_back(MakeMode(m, 100 + 100 * m, -3, coupling));
   return MakeBank(modes, 1e-3F);
 }

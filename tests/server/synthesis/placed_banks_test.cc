@@ -106,6 +106,7 @@ std::vector<float> RenderCrowd(size_t thread_count, size_t blocks_a_call) {
   const auto stream = mixer.OpenStream(65536).value();
   for (uint32_t i = 0; i < 60; ++i) {
     std::vector<SoundingMode> modes;
+    modes.reserve(150);
     for (uint32_t m = 0; m < 150; ++m) {
       modes.push_back(MakeMode(m, 60 + 97 * m + i, -1 - 0.3 * (m * 7 % 150)));
     }
