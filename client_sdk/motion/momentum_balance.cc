@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "client_sdk/motion/in_parallel.h"
@@ -19,6 +21,10 @@ constexpr double kEnoughShare = 1e-8;
 /// An unknown whose change gains less than this share of the mean rests for some sweeps.
 constexpr double kFaintGain = 0.01;
 constexpr int kRestSweeps = 3;
+/// The frames of a part of an island,
+constexpr uint32_t kPartFrames = 32;
+/// and the part of those unknowns that last longer.
+constexpr uint32_t kLongPart = std::numeric_limits<uint32_t>::max();
 
 Matrix Cross(const Vector& v) {
   Matrix m;
@@ -204,27 +210,76 @@ void MomentumBalance::Repeat(std::span<Active> island, double share) {
 }
 
 /// Ends with a sweep of all unknowns that gains next to nothing: a blow at a frame and a load there
-/// do nearly the same, and if one rested, they would stop each other halfway.
-void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double energy) {
+/// do nearly the same, and if one rested, they would stop each other halfway. A part that does not
+/// come so far stays stale.
+void MomentumBalance::SolvePart(Part& solved, double cost_factor, double energy) {
   const double end_gain = (cost_factor < 1 ? kEndShare : kEndShareOfCosts) * energy;
   const double enough_gain = std::max(end_gain, kEnoughShare * energy);
-  constexpr int kMostSweeps = 100;
+  constexpr int kMostSweeps = 30;
+  const std::span<Active> part = solved.unknowns;
   double before = 0;
   bool all_took_part = true;
+  for (Active& one : part) one.rests = 0;
   for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
-    const double faint = kFaintGain * before / static_cast<double>(island.size());
-    const double gained = Sweep(island, cost_factor, faint, sweep % 2 == 1);
+    const double faint = kFaintGain * before / static_cast<double>(part.size());
+    const double gained = Sweep(part, cost_factor, faint, sweep % 2 == 1);
+    solved.gained += gained;
     if (gained <= (all_took_part ? enough_gain : end_gain)) {
-      if (all_took_part) return;
-      for (Active& one : island) one.rests = 0;
+      if (all_took_part) {
+        solved.stale = false;
+        return;
+      }
+      for (Active& one : part) one.rests = 0;
       all_took_part = true;
       before = 0;
       continue;
     }
     all_took_part = false;
-    Repeat(island, before > 0 ? gained / before : 2);
+    Repeat(part, before > 0 ? gained / before : 2);
     before = gained;
   }
+}
+
+/// Solves for the unknowns of some frames at a time, until no part changes its neighbours. Parts
+/// that are not neighbours share no node, and are solved in parallel.
+void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, double energy) {
+  std::vector<Part> parts;
+  for (size_t first = 0, end = 0; first < island.size(); first = end) {
+    while (end < island.size() && island[end].part == island[first].part) ++end;
+    parts.push_back({island[first].part, island.subspan(first, end - first)});
+  }
+  const double enough_gain = kEnoughShare * energy;
+  const auto solve = [&](const std::function<bool(const Part&)>& in_turn) {
+    std::vector<Part*> now;
+    for (Part& part : parts) {
+      if (part.stale && in_turn(part)) now.push_back(&part);
+    }
+    InParallel(now.size(), [&](size_t i) { SolvePart(*now[i], cost_factor, energy); });
+    for (Part* const part : now) {
+      if (std::exchange(part->gained, 0) <= enough_gain) continue;
+      for (Part& other : parts) other.stale = other.stale || AreNeighbours(*part, other);
+    }
+  };
+  constexpr int kMostRounds = 4;
+  for (int round = 0; round < kMostRounds; ++round) {
+    if (std::ranges::none_of(parts, &Part::stale)) return;
+    solve([](const Part& part) { return part.number != kLongPart && part.number % 2 == 0; });
+    solve([](const Part& part) { return part.number != kLongPart && part.number % 2 == 1; });
+    solve([](const Part& part) { return part.number == kLongPart; });
+  }
+}
+
+/// Returns the number of the part of its island that an unknown belongs to.
+uint32_t MomentumBalance::PartOf(const Unknown& u) {
+  const uint32_t first = u.nodes[0].frame;
+  const uint32_t last = u.nodes[static_cast<size_t>(u.node_count - 1)].frame;
+  return last - first < kPartFrames ? first / kPartFrames : kLongPart;
+}
+
+/// True if two parts may share a node.
+bool MomentumBalance::AreNeighbours(const Part& one, const Part& other) {
+  if (one.number == kLongPart || other.number == kLongPart) return one.number != other.number;
+  return one.number + 1 == other.number || other.number + 1 == one.number;
 }
 
 /// Sorts unknowns into islands, which share no node.
@@ -251,8 +306,13 @@ std::vector<MomentumBalance::Island> MomentumBalance::FindIslands(
   }
   std::vector<double> energy(rows_.size(), 0);
   for (size_t i = 0; i < rows_.size(); ++i) energy[find(i)] += rows_[i].given;
-  for (Active& one : active) one.island = of(one);
-  const auto place = [](const Active& one) { return std::pair(one.island, one.unknown); };
+  for (Active& one : active) {
+    one.island = of(one);
+    one.part = PartOf(unknowns_[one.unknown]);
+  }
+  const auto place = [](const Active& one) {
+    return std::tuple(one.island, one.part, one.unknown);
+  };
   std::ranges::sort(active, {}, place);
   std::vector<Island> islands;
   for (size_t i = 0; i < active.size(); ++i) {

@@ -44,7 +44,8 @@ struct Unknown {
 ///
 /// where rows are scaled to energy: by m^(-1/2) and I^(-1/2). Blocks of three unknowns are solved
 /// for in turn (block coordinate descent with conjugate directions), most of which never leave
-/// zero. Islands of unknowns that share no node are solved apart, in parallel.
+/// zero. Islands of unknowns that share no node are solved apart, in parallel, and so are distant
+/// times of an island.
 class MomentumBalance {
  public:
   MomentumBalance(size_t body_count, size_t frame_count);
@@ -84,10 +85,17 @@ class MomentumBalance {
     size_t unknown = 0;
     Matrix hessian = Matrix::Zero(), inverse = Matrix::Zero();
     double largest = 0;  ///< bound of the eigenvalues of the Hessian
-    uint32_t island = 0;
+    uint32_t island = 0, part = 0;
     int rests = 0;                      ///< sweeps that leave it out, because it hardly changed
     Vector step = Vector::Zero();       ///< what the last sweep changed
     Vector direction = Vector::Zero();  ///< what the sweeps before changed
+  };
+  /// Unknowns of some frames of an island, or those that last longer.
+  struct Part {
+    uint32_t number = 0;
+    std::span<Active> unknowns;
+    bool stale = true;  ///< not solved yet, or not since its neighbours have changed
+    double gained = 0;  ///< by the last solution, J, twice
   };
   struct Island {
     size_t first = 0, count = 0;  ///< which of the active unknowns
@@ -106,7 +114,10 @@ class MomentumBalance {
   Vector Best(const Active& active, const Vector& pull, double cost) const;
   double Sweep(std::span<Active> island, double cost_factor, double faint_gain, bool backwards);
   void Repeat(std::span<Active> island, double share);
+  void SolvePart(Part& solved, double cost_factor, double energy);
   void SolveIsland(std::span<Active> island, double cost_factor, double energy);
+  static uint32_t PartOf(const Unknown& u);
+  static bool AreNeighbours(const Part& one, const Part& other);
   std::vector<Island> FindIslands(std::vector<Active>& active) const;
 
   size_t frames_;

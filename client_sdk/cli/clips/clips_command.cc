@@ -336,11 +336,19 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
                          const StopSignal& stop, bool json) {
   const auto begin = std::chrono::steady_clock::now();
   ASSIGN_OR_RETURN(const std::vector<std::string> clips, ListTraces(options.trace));
+  const std::vector<std::string> mine = OfShard(clips, options.shard);
+  if (options.wait) {
+    std::vector<std::string> traces;
+    for (const std::string& clip : mine) {
+      traces.push_back((fs::path(options.trace) / absl::StrCat(clip, ".contacts")).string());
+    }
+    RETURN_IF_ERROR(AwaitTransfers(daemon, traces));
+  }
   ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());
   ASSIGN_OR_RETURN(const ClipFolder folder, ClipFolder::Open(options.out));
   const ClipRenderer renderer(daemon, options, folder, stop,
                               SettingsText(options, mixer.version()));
-  ClipRun run(renderer, OfShard(clips, options.shard));
+  ClipRun run(renderer, mine);
   const absl::Status stopped = run.Run(options.worker_count);
   RETURN_IF_ERROR(folder.WriteManifest(clips));
   const double seconds =

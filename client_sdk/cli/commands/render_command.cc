@@ -5,12 +5,15 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/trace_page.h"
+#include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
@@ -30,8 +33,8 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
     absl::FPrintF(
         out,
         "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
-        "transfer for the material: the sound changes once `carillon job list` shows none at work; "
-        "`carillon transfer` makes one that was never begun\n",
+        "transfer for the material: --wait waits for one that is being computed, and `carillon "
+        "transfer` makes one that was never begun\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
@@ -105,6 +108,27 @@ void PrintRenderingJson(const RenderOptions& options, const v1::RenderSummary& s
 
 }  // namespace
 
+absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces) {
+  std::set<std::string> models;
+  for (const std::string& path : traces) {
+    auto trace = client::ContactTraceReader::Open(path);
+    while (trace.ok()) {
+      const auto record = trace->Next();
+      if (!record.ok() || !*record) break;
+      if ((*record)->has_object()) models.insert((*record)->object().modal_model());
+    }
+  }
+  v1::ListJobsRequest unfinished;
+  unfinished.add_states(v1::JOB_STATE_QUEUED);
+  unfinished.add_states(v1::JOB_STATE_RUNNING);
+  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, daemon.ListJobs(unfinished));
+  for (const v1::Job& job : jobs) {
+    if (job.kind() != v1::JOB_KIND_TRANSFER || !models.contains(job.modal_model())) continue;
+    RETURN_IF_ERROR(WatchWithProgress(daemon, job.name()).status());
+  }
+  return absl::OkStatus();
+}
+
 v1::RenderSettings SettingsOf(const RenderOptions& options) {
   v1::RenderSettings settings;
   settings.set_sample_rate_hz(options.sample_rate_hz);
@@ -157,6 +181,7 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
 
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members) {
+  if (options.wait) RETURN_IF_ERROR(AwaitTransfers(daemon, {options.trace}));
   RenderedFile file(FormOf(options, options.out));
   v1::ContactTraceHeader header;
   RenderedTrace page{.trace = options.trace, .wave = options.out};

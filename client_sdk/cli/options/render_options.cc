@@ -53,6 +53,9 @@ void AddSound(CLI::App& render, RenderOptions& options) {
       "--tail", options.tail_s,
       "The time to render after the last contact, s; 0 renders until the sound has died "
       "away [0]");
+  render.add_flag("--wait", options.wait,
+                  "First wait until the radiation of the bodies is computed, after which their "
+                  "levels and decays are final");
 }
 
 namespace {
@@ -108,6 +111,11 @@ void CheckUse(const CLI::App& render, const RenderOptions& options) {
     throw CLI::ValidationError(option,
                                absl::StrCat("is for a folder of traces, and \"", options.trace,
                                             "\" is none; name a folder, or leave the option out"));
+  }
+  std::error_code ignored;
+  if (options.wait && !is_folder && std::filesystem::exists(options.trace, ignored) &&
+      !std::filesystem::is_regular_file(options.trace, ignored)) {
+    throw CLI::ValidationError("--wait", "needs a trace in a file, which is read twice");
   }
   if (!options.html.empty() && (options.out == "-" || options.trace == "-" || is_folder)) {
     throw CLI::ValidationError(
