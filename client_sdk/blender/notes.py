@@ -81,8 +81,8 @@ def of_sound(scene, folder, figures, jobs):
         full = ", and Normalize makes it loud" if scene.carillon.normalize else ""
         lines.append(f"warning: no impact in this range: what is heard rests, rolls or slides{full}")
     if "paper's coupling" in (folder / "summary").read_text(encoding="utf-8", errors="replace"):
-        lines.append("warning: without the radiation of the bodies, whose computation takes minutes, levels are not "
-                     "physical: a body may be too loud or too soft beside another")
+        lines.append("warning: without Radiation, levels are not physical: a body may be too loud or too soft beside "
+                     "another")
     whole = _peak(folder / "sound.wav")
     for stem in sorted((folder / "stems").glob("*.wav")):
         share = _peak(stem) / whole if whole > 0 else 1

@@ -51,6 +51,10 @@ class CarillonScene(bpy.types.PropertyGroup):
         name="Sub-frames", default=0, min=0, max=100, update=changed,
         description="Poses for each frame. 0: each step of the simulation, up to 1000 poses a second; of keys, as "
                     "dense as they are")
+    radiation: BoolProperty(
+        name="Radiation", update=changed,
+        description="Compute how the bodies radiate before they are heard, which takes seconds to minutes for a new "
+                    "body. Otherwise levels and decays are not those of real bodies")
     stems: BoolProperty(name="Stems", update=changed,
                         description="Put the sound of each object, muted, on a channel of its own, too")
     channel: IntProperty(name="Strip Channel", default=1, min=1, max=32,

@@ -124,6 +124,7 @@ def _words(scene, found, folder):
              "--channels", chosen.channels, "--gain", f"{chosen.gain_db}dB",
              "--striker", chosen.striker, "--roughness", str(chosen.roughness)]
     words += ["--normalize"] if chosen.normalize else []
+    words += ["--wait"] if chosen.radiation else []
     words += ["--frames-are-steps"] if found.steps else []
     words += ["--force"] if chosen.force else []
     words += ["--stems", folder / "stems"] if chosen.stems or _are_few(found) else []

@@ -132,7 +132,7 @@ struct RenderOptions {
   std::optional<double> length_s;  ///< of the file: a longer sound is cut, and a shorter one is
                                    ///< followed by silence; absent: that of the sound
   double fade_s = 0.01;            ///< over which a sound that is cut fades out
-  bool wait = false;               ///< for the radiation of the bodies that is being computed
+  bool wait = false;               ///< until the radiation of the bodies is computed
   // These apply to a folder only.
   bool stems = false;       ///< write the sound of each object alone, too
   size_t worker_count = 1;  ///< clips at a time
@@ -219,9 +219,8 @@ absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
 /// another trace is rendered at the same scale, without `normalize`.
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members = {});
-/// Waits until the transfers of the bodies of traces that are being computed are there, and shows
-/// the progress. Passes over what cannot be read in a trace: its rendering says why. Errors: those
-/// of the jobs.
+/// Lets the daemon compute the transfers that the objects of traces lack, and shows the progress.
+/// Passes over what a trace has wrong: its rendering says why. Errors: those of the jobs.
 absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Returns how the sound of a trace is written to the file `path`.

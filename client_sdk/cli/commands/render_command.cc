@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -33,8 +33,7 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
     absl::FPrintF(
         out,
         "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
-        "transfer for the material: --wait waits for one that is being computed, and `carillon "
-        "transfer` makes one that was never begun\n",
+        "transfer for the material: with --wait it is computed first\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
@@ -109,22 +108,31 @@ void PrintRenderingJson(const RenderOptions& options, const v1::RenderSummary& s
 }  // namespace
 
 absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces) {
-  std::set<std::string> models;
+  std::map<std::string, v1::CreateTransferRequest> requests;
   for (const std::string& path : traces) {
     auto trace = client::ContactTraceReader::Open(path);
     while (trace.ok()) {
       const auto record = trace->Next();
       if (!record.ok() || !*record) break;
-      if ((*record)->has_object()) models.insert((*record)->object().modal_model());
+      const v1::ContactTraceObject& object = (*record)->object();
+      if (!(*record)->has_object() || object.radiation() == v1::RADIATION_MODEL_PAPER_COUPLING) {
+        continue;
+      }
+      v1::CreateTransferRequest request;
+      request.set_modal_model(object.modal_model());
+      *request.mutable_material() = object.material();
+      request.set_size(object.size());
+      requests.try_emplace(request.SerializeAsString(), request).first->second.set_label(
+          object.label());
     }
   }
-  v1::ListJobsRequest unfinished;
-  unfinished.add_states(v1::JOB_STATE_QUEUED);
-  unfinished.add_states(v1::JOB_STATE_RUNNING);
-  ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, daemon.ListJobs(unfinished));
-  for (const v1::Job& job : jobs) {
-    if (job.kind() != v1::JOB_KIND_TRANSFER || !models.contains(job.modal_model())) continue;
-    RETURN_IF_ERROR(WatchWithProgress(daemon, job.name()).status());
+  std::vector<std::string> unfinished;
+  for (const auto& [key, request] : requests) {
+    const absl::StatusOr<v1::Job> job = daemon.CreateTransfer(request);
+    if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) unfinished.push_back(job->name());
+  }
+  for (const std::string& job : unfinished) {
+    RETURN_IF_ERROR(WatchWithProgress(daemon, job).status());
   }
   return absl::OkStatus();
 }

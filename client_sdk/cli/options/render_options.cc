@@ -54,8 +54,8 @@ void AddSound(CLI::App& render, RenderOptions& options) {
       "The time to render after the last contact, s; 0 renders until the sound has died "
       "away [0]");
   render.add_flag("--wait", options.wait,
-                  "First wait until the radiation of the bodies is computed, after which their "
-                  "levels and decays are final");
+                  "First compute the radiation that the bodies lack, which takes from seconds to "
+                  "minutes; otherwise their levels and decays are not final");
 }
 
 namespace {
