@@ -133,6 +133,8 @@ export class CarillonError extends Error {
   readonly metadata: Record<string, string>;
   /** Changes to the request that may help, the most promising first. */
   readonly remedies: Remedy__Output[];
+  /** Of a step that rejected a contact: what it gave all the same. */
+  readonly performed?: { samples: Float32Array; frameCount: number; impacts: PerformedImpacts__Output | null };
 }
 
 /** No daemon answers at the address. */

@@ -128,7 +128,8 @@ class Performance {
    * `environments` have the index of each row, by default 0. The sound lasts the step over `timeScale`, by default 1,
    * and the step in a pause, at 0. Returns the samples of the step, a Float32Array with
    * element [environment][channel][frame], `frameCount`, and the impacts if the performance tells them, as the columns
-   * of PerformedImpacts. Throws CarillonError if a contact is rejected; the step was performed without it.
+   * of PerformedImpacts. Throws CarillonError if a contact is rejected; the step was performed without it, and the
+   * error has what it gave as `performed`.
    */
   async step(content = {}) {
     refuseUnknown(content, ['contacts', 'impacts', 'forces', 'poses', 'timeScale'], 'step');
@@ -146,11 +147,12 @@ class Performance {
       ({ samples: answer } = await this.receive());
       pieces.push(answer.samples);
     }
+    const performed = { samples: samplesOf(pieces), frameCount: answer.frameCount, impacts: answer.impacts };
     if (answer.rejectedCount > this.rejectedCount) {
       this.rejectedCount = answer.rejectedCount;
-      throw fromInfo(answer.lastRejection);
+      throw Object.assign(fromInfo(answer.lastRejection), { performed });
     }
-    return { samples: samplesOf(pieces), frameCount: answer.frameCount, impacts: answer.impacts };
+    return performed;
   }
 
   /** Ends the performance, and warns of what is probably wrong with its contacts. Returns the warnings. */

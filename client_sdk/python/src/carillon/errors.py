@@ -23,7 +23,10 @@ class CarillonError(Exception):
     """A refusal. `reason` is stable and one of proto/errors.md's; `message` is a sentence that says what was wrong,
     where, and how to repair it; `metadata` has figures that belong to the reason; `remedies` are changes to the
     request that may help, the most promising first: each has a `field` of CreateModalModelRequest, a `value` in
-    protobuf's text form (empty: the caller chooses), the command line's `option`, and its `effect` in words."""
+    protobuf's text form (empty: the caller chooses), the command line's `option`, and its `effect` in words.
+    `performed` are the samples and impacts of the step of a performance that rejected a contact, and otherwise None."""
+
+    performed: Any = None
 
     def __init__(self, reason: str, message: str, metadata: dict[str, str] | None = None,
                  remedies: Iterable[error_pb2.Remedy] = ()):

@@ -213,7 +213,8 @@ class PerformanceCalls(Block):
         `environments` have the index of each row, by default 0. The sound lasts the step over `time_scale`, by default
         1, and the step in a pause, at 0. Returns the samples of the step, a float32 array
         [environment, channel, frame] that must not be written to, and the impacts if the performance tells them. Raises
-        CarillonError if a contact is rejected; the step was performed without it."""
+        CarillonError if a contact is rejected; the step was performed without it, and the error has what it gave as
+        `performed`."""
         scale = checked_scale(time_scale)
         step = performance_pb2.PerformStep(time_scale=scale)
         _fill(step, self._settings.frame, contacts, impacts, forces, poses)
@@ -226,13 +227,16 @@ class PerformanceCalls(Block):
         while not message.is_last:
             message = (await self._receive()).samples
             pieces.append(message)
-        if message.rejected_count > self._rejected_count:
-            self._rejected_count = message.rejected_count
-            raise errors.from_info(message.last_rejection)
         samples = numpy.frombuffer(pieces[0].samples if len(pieces) == 1 else b"".join(p.samples for p in pieces),
                                    "<f4")
-        return (samples.reshape(self.environment_count, self.channel_count, message.frame_count),
-                _heard(message.impacts))
+        performed = (samples.reshape(self.environment_count, self.channel_count, message.frame_count),
+                     _heard(message.impacts))
+        if message.rejected_count > self._rejected_count:
+            self._rejected_count = message.rejected_count
+            error = errors.from_info(message.last_rejection)
+            error.performed = performed
+            raise error
+        return performed
 
     def _indices(self, environments: Environments) -> list[int]:
         """Indices for a message, where none means all."""
