@@ -135,6 +135,20 @@ class PerformanceTest(DaemonTest):
         with self.assertRaises(TypeError):
             self.c.perform(step=STEP_S, channels=2)
 
+    def test_what_is_not_finite_in_one_environment_costs_the_others_nothing(self):
+        def impacts(environments, impulses):
+            return carillon.Impacts([1] * len(environments), [POINT] * len(environments), impulses,
+                                    durations=DURATION_S, environments=environments)
+
+        clean, spoilt = self.begin(environments=3), self.begin(environments=3)
+        for step in range(4):
+            wanted, _ = clean.step(impacts=impacts([0, 2], [IMPULSE] * 2))
+            with self.assertRaises(carillon.CarillonError) as refused:
+                spoilt.step(impacts=impacts([0, 1, 2], [IMPULSE, (numpy.nan, 0, 0), IMPULSE]),
+                            poses=carillon.Poses([1], [(numpy.inf, 0, 0)], environments=[1]))
+            numpy.testing.assert_array_equal(refused.exception.performed[0], wanted)
+            self.assertEqual(bool(wanted[[0, 2]].any()), step > 0)
+
     def test_environments_are_reset_by_a_mask(self):
         sound = self.begin(environments=3)
         sound.step(impacts=carillon.Impacts([1] * 3, [POINT] * 3, [IMPULSE] * 3, durations=DURATION_S,

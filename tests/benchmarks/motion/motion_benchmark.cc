@@ -61,6 +61,26 @@ void PrintRow(const std::string& name, const falls::FallScene& scene, const Engi
   std::fflush(stdout);
 }
 
+/// Prints the means over ten piles of blocks, whose ball starts at other places: one pile falls in
+/// one way only.
+void PrintPiles(const Engine& engine, int frames_per_second) {
+  constexpr int kPiles = 10;
+  Likeness mean;
+  for (int i = 0; i < kPiles; ++i) {
+    falls::FallScene scene = BlocksScene();
+    scene.bodies.back().position_m[0] -= 0.003 * i;
+    const Fall fall = Drop(scene, engine, 2400 / frames_per_second);
+    const auto found = FindContacts(fall.motion);
+    if (!found.ok()) continue;
+    const Likeness is = Compare(fall, *found);
+    mean.found_share += is.found_share / kPiles;
+    mean.false_share += is.false_share / kPiles;
+  }
+  std::printf("ten piles\t%d\t%.1f %%\t%.1f %%\n", frames_per_second, 100 * mean.found_share,
+              100 * mean.false_share);
+  std::fflush(stdout);
+}
+
 /// Fifty boxes that fall from different heights, for 20 s.
 falls::FallScene CrowdScene() {
   falls::FallScene scene = CornerScene();
@@ -87,6 +107,10 @@ int Main(int argc, char** argv) {
       if (words.size() > 2 && words[2] != std::to_string(rate)) continue;
       if (words.size() < 2 || words[1] == name) PrintRow(name, scene, engine, rate);
     }
+  }
+  for (const int rate : {60, 120, 240}) {
+    if (words.size() > 2 && words[2] != std::to_string(rate)) continue;
+    if (words.size() > 1 && words[1] == "piles") PrintPiles(engine, rate);
   }
   if (words.size() > 1 && words[1] == "crowd") PrintRow("crowd", CrowdScene(), engine, 60);
   return 0;

@@ -120,3 +120,7 @@ class BlenderTest(unittest.TestCase):
         self.assertEqual(self.found["keyed"]["result"], ["FINISHED"], self.found["keyed"])
         samples = sound.read_wave(self.folder / "carillon" / "keyed-Scene" / "sound.wav").sum(axis=-1)
         self.assertAlmostEqual(self.onset_s(samples), self.found["keyed lands"], delta=0.001)
+
+    def test_the_report_names_sound_without_radiation(self):
+        self.assertIn("Radiation", self.found["usual"]["report"])
+        self.assertNotIn("Radiation", self.found["keyed"]["report"])

@@ -145,6 +145,21 @@ class FoleyTest(DaemonTest):
         self.assertAlmostEqual(first, LANDS_S, delta=0.001)
         numpy.testing.assert_array_equal(sound.read_wave(stems / "1-Bar.wav"), samples)
 
+    def test_wait_computes_the_radiation_before_the_sound(self):
+        def heard(command, name, *words):
+            out = self.folder / f"{name}.wav"
+            told = json.loads(self.daemon.command("--json", command, self.folder / name, "--out", out, "--tail", 1,
+                                                  *words).stdout)
+            return sound.read_wave(out), int(told["paper_coupling_object_count"])
+
+        self.assertEqual(heard("foley", "fall.glb")[1], 1)
+        waited, count = heard("foley", "fall.glb", "--wait")
+        self.assertEqual(count, 0)
+        numpy.testing.assert_array_equal(heard("foley", "fall.glb")[0], waited)
+        self.foley("fall.glb", "--material", "Bar=brass", "--trace", self.folder / "brass.contacts")
+        self.assertEqual(heard("render", "brass.contacts")[1], 1)
+        self.assertEqual(heard("render", "brass.contacts", "--wait")[1], 0)
+
     def test_scaled_and_mirrored_nodes_and_each_interpolation_give_the_same_impact(self):
         for name, form in {"scaled": {"scale": (0.1, 2, 0.5)}, "mirrored": {"scale": (1, -1, 1)},
                            "step": {"interpolation": "STEP"}, "spline": {"interpolation": "CUBICSPLINE"},

@@ -178,6 +178,7 @@ def usual():
 def keyed():
     """The bounce of a bar by keys alone, one for each frame, on a floor that is no rigid body."""
     scene = empty_scene("keyed", 60)
+    scene.carillon.radiation = True
     add("Floor", None, (0, 0, 0), (1, 1, 1), size=4).carillon.material = "none"
     bar = add("Keyed", None, (0, 0, 0), (0.3, 0.03, 0.015))
     bar.carillon.material = "structural_steel"
