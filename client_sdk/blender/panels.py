@@ -50,8 +50,8 @@ class CARILLON_PT_scene(bpy.types.Panel):
                            "carillon-precompute", 'ERROR')
         _draw_bake(layout, context)
         layout.use_property_split = True
-        for name in ("use_camera", "channels", "normalize", "gain_db", "striker", "roughness", "radiation", "sub_frames",
-                     "channel", "stems", "force"):
+        for name in ("use_camera", "channels", "normalize", "gain_db", "striker", "roughness", "radiation",
+                     "sub_frames", "channel", "stems", "force"):
             layout.prop(chosen, name)
 
 

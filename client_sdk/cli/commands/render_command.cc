@@ -122,8 +122,8 @@ absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std:
       request.set_modal_model(object.modal_model());
       *request.mutable_material() = object.material();
       request.set_size(object.size());
-      requests.try_emplace(request.SerializeAsString(), request).first->second.set_label(
-          object.label());
+      requests.try_emplace(request.SerializeAsString(), request)
+          .first->second.set_label(object.label());
     }
   }
   std::vector<std::string> unfinished;
