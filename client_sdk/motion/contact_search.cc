@@ -238,7 +238,29 @@ void ContactSearch::Add(Candidate candidate, double time_s, Path path,
   };
   candidate.arm_a = arm(pair.a, candidate.feature.point_a);
   candidate.arm_b = arm(pair.b, candidate.feature.point_b);
+  // A step of a simulator may push several points at once that part after the first push.
+  if (candidate.blow() && !motion_.frames_are_steps && IsOfFarSide(candidate)) return;
   out.push_back(candidate);
+}
+
+/// True if a blow would push against what happens to the bodies there: they part before it, and
+/// more slowly after it than free flight would let them. On its way into a thin body the other one
+/// passes the middle, from where the far side is the nearest.
+bool ContactSearch::IsOfFarSide(const Candidate& candidate) const {
+  const BodyPair& pair = pairs_[candidate.pair];
+  const BodyMotion &a = bodies_.motions[pair.a], &b = bodies_.motions[pair.b];
+  const Vector& normal = candidate.feature.normal;
+  const size_t first = std::max<size_t>(candidate.frame, 1) - 1;
+  const size_t last = std::min<size_t>(candidate.frame + 1, frames_ - 2);
+  const auto parting = [&](size_t interval) {
+    return normal.dot(a.MeanVelocity(interval, candidate.arm_a) -
+                      b.MeanVelocity(interval, candidate.arm_b));
+  };
+  const double falls = (a.balanced() ? 1 : 0) - (b.balanced() ? 1 : 0);
+  const double in_flight = falls * normal.dot(motion_.gravity_m_per_s2) * motion_.frame_s *
+                           static_cast<double>(last - first);
+  const double before = parting(first);
+  return before > 0 && parting(last) < before + in_flight - kStillSpeed;
 }
 
 void ContactSearch::AddLoads(size_t p, const std::vector<PairFrame>& frames,

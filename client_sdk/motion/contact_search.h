@@ -84,6 +84,7 @@ class ContactSearch {
   void AddBlows(size_t pair, const std::vector<PairFrame>& frames, bool known,
                 std::vector<Candidate>& out) const;
   void Add(Candidate candidate, double time_s, Path path, std::vector<Candidate>& out) const;
+  bool IsOfFarSide(const Candidate& candidate) const;
 
   const Motion& motion_;
   const SearchBodies& bodies_;

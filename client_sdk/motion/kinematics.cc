@@ -175,6 +175,13 @@ double BodyMotion::Speed(size_t interval) const {
          frame_s_;
 }
 
+Vector BodyMotion::MeanVelocity(size_t interval, const Vector& arm) const {
+  if (!moves()) return Vector::Zero();
+  return (places_[interval + 1].position_m - places_[interval].position_m +
+          turn_[interval].cross(arm)) /
+         frame_s_;
+}
+
 Vector BodyMotion::VelocityAt(size_t frame, const Vector& arm) const {
   if (!moves()) return Vector::Zero();
   const size_t before = frame > 0 ? frame - 1 : frame;

@@ -57,6 +57,8 @@ class BodyMotion {
   double Speed(size_t interval) const;
   /// The turn within an interval, rad.
   double Angle(size_t interval) const { return turn_[interval].norm(); }
+  /// The velocity of a point `arm` away from the centre of mass, averaged over an interval.
+  Vector MeanVelocity(size_t interval, const Vector& arm) const;
   /// The velocity of a point `arm` away from the centre of mass, averaged around a frame.
   Vector VelocityAt(size_t frame, const Vector& arm) const;
   /// The velocity of a point `arm` away from the centre of mass at a time within an interval, on

@@ -102,6 +102,56 @@ TEST(FindContacts, TimesAFlatLandingWhereverItLiesInItsFrame) {
   }
 }
 
+/// A disc of 12 cm by 5 mm.
+BodySurface DiscSurface() {
+  constexpr uint32_t kCorners = 40;
+  BodySurface disc;
+  for (uint32_t i = 0; i < kCorners; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kCorners;
+    for (const double z : {-0.0025, 0.0025}) {
+      disc.vertices_m.emplace_back(0.06 * std::cos(angle), 0.06 * std::sin(angle), z);
+    }
+    const uint32_t here = 2 * i, next = 2 * ((i + 1) % kCorners);
+    disc.triangles.push_back({here, next, next + 1});
+    disc.triangles.push_back({here, next + 1, here + 1});
+    if (i > 1) {
+      disc.triangles.push_back({0, here, here - 2});
+      disc.triangles.push_back({1, here - 1, here + 1});
+    }
+  }
+  return disc;
+}
+
+// A disc lands on its rim after 0.173 s and, within one frame in which it falls by more than the
+// table is thick, three times from 0.392 s on. The poses are those of exact flights between bounces
+// of a restitution of 0.5 and a friction of 0.4.
+TEST(FindContacts, TheFarSideOfAThinTableDoesNotPullADiscDown) {
+  constexpr double kPoses[][3] = {
+      {0, 0.205555, 1.095448},         {0.003333, 0.200105, 1.145074},
+      {0.006667, 0.183755, 1.194700},  {0.010000, 0.156505, 1.244326},
+      {0.013333, 0.118355, 1.293952},  {0.016667, 0.069305, 1.343579},
+      {0.010264, 0.077515, 1.234043},  {0.001674, 0.090145, 1.088731},
+      {-0.006917, 0.091875, 0.943419}, {-0.015508, 0.082706, 0.798107},
+      {-0.024099, 0.062636, 0.652795}, {-0.032690, 0.031666, 0.507483},
+      {-0.039422, 0.006557, 0.028030}};  // x, z, m, and the turn about y, rad
+  const falls::Body table = BoxBody("table", {0.3, 0.2, 0.02}, 1);
+  Motion motion = OnFloor(table, 1.0 / 30);
+  motion.bodies[0].surface = motion.bodies[1].surface;
+  motion.bodies[0].poses[0].position_m.z() = -0.01;
+  MovingBody& disc = motion.bodies[1];
+  disc.surface = DiscSurface();
+  disc.mass_kg = 0.140791;
+  disc.inertia_kg_m2 = Vector(1.26485e-4, 1.26485e-4, 2.52384e-4).asDiagonal();
+  for (const auto& [x, z, turn] : kPoses) {
+    disc.poses.push_back({{x, 0, z}, Turn(Eigen::AngleAxisd(turn, Vector::UnitY()))});
+  }
+  const FoundContacts found = FindContacts(motion).value();
+  EXPECT_GE(found.blows.size(), 2U);
+  for (const FoundBlow& blow : found.blows) {
+    EXPECT_LT(blow.impulse_newton_seconds.z(), 0) << blow.frame;  // on the table
+  }
+}
+
 TEST(FindContacts, SaysHowDeepBodiesThatStrikeAreInsideOfEachOther) {
   Bounce bounce = BallBounce(1.0 / 60, 0.003);
   const FoundContacts good = FindContacts(bounce.motion).value();
