@@ -132,8 +132,37 @@ class PerformanceTest(DaemonTest):
                 self.begin(**settings)
         with self.assertRaises(ValueError):
             carillon.Trace(STEP_S).step(0, impacts=impact(1, environments=[0]))
+        two = carillon.Impacts(1, [POINT] * 2, [IMPULSE] * 2, durations=DURATION_S, environments=[0])
+        goes_on = self.begin(environments=3)
+        for act in (lambda: goes_on.step(impacts=two), lambda: goes_on.reset(numpy.array([1, 0, 1]))):
+            with self.assertRaises(ValueError):
+                act()
+        goes_on.step(impacts=impact(1))
         with self.assertRaises(TypeError):
             self.c.perform(step=STEP_S, channels=2)
+
+    def test_contacts_for_which_a_step_has_no_place_are_rejected_at_once(self):
+        def heard(count):
+            sound = self.begin()
+            impacts = carillon.Impacts(1, [POINT] * count, [numpy.multiply(IMPULSE, 1e-3)] * count,
+                                       durations=DURATION_S)
+            if count <= 512:
+                sound.step(impacts=impacts)
+            else:
+                with self.assertRaises(carillon.CarillonError) as refused:
+                    sound.step(impacts=impacts)
+                self.assertEqual(refused.exception.reason, "TOO_MANY_CONTACTS")
+            return sound.step()[0]
+
+        numpy.testing.assert_array_equal(heard(600), heard(512))
+        numpy.testing.assert_allclose(heard(512), 512 * heard(1), rtol=0, atol=0.01 * abs(heard(512)).max())
+
+    def test_effects_leave_the_distance_from_which_on_the_level_falls(self):
+        sound = self.begin(hearing={"distance_gain": True, "directivity": False},
+                           microphones=[carillon.Omni(at=(0, 0, z)) for z in (0.2, 1)])
+        sound.step(impacts=carillon.Impacts(1, [POINT], [IMPULSE], durations=DURATION_S))
+        peaks = abs(sound.step()[0][0]).max(axis=1)
+        self.assertAlmostEqual(peaks[0] / peaks[1], 5, delta=0.01)
 
     def test_what_is_not_finite_in_one_environment_costs_the_others_nothing(self):
         def impacts(environments, impulses):

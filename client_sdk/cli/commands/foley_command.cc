@@ -124,8 +124,8 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
   }
   if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
     absl::FPrintF(stderr,
-                  "warning: %.2g %% of the momentum is unexplained, most of it of %s: the contacts "
-                  "there are less sure\n",
+                  "warning: %.2g %% is unexplained, most of it of %s: the contacts there are less "
+                  "sure\n",
                   100 * is.unexplained, EscapedText(where));
   }
   if (force) return absl::OkStatus();
@@ -150,8 +150,8 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
   }
   return Refusal(
       absl::StatusCode::kInvalidArgument, "MOTION_UNEXPLAINED",
-      absl::StrCat("contacts explain all but ", absl::SixDigits(100 * is.unexplained),
-                   " % of the momentum, and 3 % is the most; the worst is ", where,
+      absl::StrCat("contacts leave ", absl::SixDigits(100 * is.unexplained),
+                   " % unexplained, and 3 % is the most; the worst is ", where,
                    ": check --gravity, --mass and --unit, export more frames a second, or name "
                    "bodies that are moved by hand (--driven); --force renders all the same"));
 }

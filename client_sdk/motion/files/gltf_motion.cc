@@ -102,6 +102,22 @@ Vector ScaleOf(const GltfMatrix& m) {
   return scale;
 }
 
+/// The scale and the shear of a matrix. The rounding of poses is taken out, so that a mesh is the
+/// same body, whose model is stored, however it lies.
+GltfMatrix InFrameOf(const BodyPose& pose, const GltfMatrix& m) {
+  constexpr int kExactBits = 20;
+  Matrix linear;
+  for (int i = 0; i < 9; ++i) linear(i % 3, i / 3) = m[static_cast<size_t>(4 * (i / 3) + i % 3)];
+  linear = pose.orientation.conjugate() * linear;
+  const double unit = std::exp2(std::floor(std::log2(linear.cwiseAbs().maxCoeff())) - kExactBits);
+  GltfMatrix own{};
+  for (int i = 0; i < 9; ++i) {
+    own[static_cast<size_t>(4 * (i / 3) + i % 3)] = std::round(linear(i % 3, i / 3) / unit) * unit;
+  }
+  own[15] = 1;
+  return own;
+}
+
 std::string NameOf(const json& node, size_t index) {
   const json& name = Member(node, "name");
   return name.is_string() ? name.get<std::string>() : absl::StrCat("node ", index);
@@ -278,12 +294,9 @@ class MotionReader {
     SceneBody& about = scene_.bodies.emplace_back();
     body.name = name;
     body.poses = PosesOf(node);
-    const Turn back = body.poses[0].orientation.conjugate();
-    for (GltfSurface& surface : ReadPlacedMesh(document_, node, worlds_[0])) {
-      for (GltfPoint& p : surface.points) {
-        const Vector point = back * (Vector(p[0], p[1], p[2]) - body.poses[0].position_m);
-        p = {point.x(), point.y(), point.z()};
-      }
+    std::vector<GltfMatrix> own = worlds_[0];
+    own[node] = InFrameOf(body.poses[0], own[node]);
+    for (const GltfSurface& surface : ReadPlacedMesh(document_, node, own)) {
       AddSurface(surface, body.surface);
     }
     if (body.surface.triangles.empty()) throw GltfFault(absl::StrCat(name, " has no triangle"));

@@ -58,7 +58,12 @@ absl::StatusOr<EnvironmentSettings> ToEnvironmentSettings(const v1::PerformSetti
   to.latency_s = settings.latency_s();
   if (settings.full_scale_pa() != 0) to.full_scale_pa = settings.full_scale_pa();
   to.hearing = {.distance_gain = true, .reference_distance_m = kReferenceDistanceM};
-  if (settings.has_hearing()) to.hearing = ToSceneSpace(settings.hearing(), {}).hearing;
+  if (settings.has_hearing()) {
+    to.hearing = ToSceneSpace(settings.hearing(), {}).hearing;
+    if (settings.hearing().reference_distance_m() == 0) {
+      to.hearing.reference_distance_m = kReferenceDistanceM;
+    }
+  }
   to.reading = ToContactReading(settings.frame(), settings.pulse_shape());
   to.tells_impacts = settings.tell_impacts();
   for (const v1::Microphone& message : settings.microphones()) {

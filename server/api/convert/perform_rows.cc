@@ -14,6 +14,9 @@
 namespace carillon {
 namespace {
 
+/// What an environment has places for in a step (Environment).
+constexpr size_t kMostEvents = 512;
+
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
 }
@@ -148,8 +151,19 @@ void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& int
     const v1::MicrophonePoses& poses = step_.microphone_poses();
     if (poses.microphone(row) == microphone) intake.MoveListener(ReadPose(poses, row));
   }
+  size_t room = kMostEvents;
   for (const Contacts& contacts : contacts_) {
-    ReadRows(*contacts.columns, contacts.rows.of(environment), contacts.hertz, intake);
+    const std::span<const int> rows = contacts.rows.of(environment);
+    const size_t events_per_row = contacts.columns->second_object().empty() ? 1 : 2;
+    const size_t taken_count = std::min(rows.size(), room / events_per_row);
+    ReadRows(*contacts.columns, rows.first(taken_count), contacts.hertz, intake);
+    room -= events_per_row * taken_count;
+    if (taken_count == rows.size()) continue;
+    intake.Reject(rows.size() - taken_count,
+                  Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CONTACTS",
+                          absl::StrCat("an environment takes ", kMostEvents,
+                                       " contacts in a step, of which those with a second object "
+                                       "count twice; report fewer points")));
   }
 }
 

@@ -196,8 +196,8 @@ def handles_of(objects: Any, count: int, name: str = "objects", wanted: str = OB
     if isinstance(objects, numpy.ndarray) and objects.dtype.kind in "iuf":
         handles = objects
     else:
-        items = numpy.atleast_1d(numpy.asarray(objects, dtype=object))
-        handles = numpy.array([_handle_of(item, name, wanted) for item in items])
+        items = numpy.asarray(objects, dtype=object)
+        handles = numpy.array([_handle_of(item, name, wanted) for item in items.ravel()]).reshape(items.shape)
     return _column(checks.whole_numbers(handles, name, wanted), count, name)
 
 
@@ -224,8 +224,9 @@ def _rows(values: Array, name: str, width: int = 3, count: Optional[int] = None)
 
 
 def _column(values: numpy.ndarray, count: int, name: str) -> numpy.ndarray:
-    if values.shape not in ((), (1,), (count,)):
-        raise ValueError(f"{name} has the shape {values.shape}; it must be ({count},), one for each row or one for all")
+    if values.shape not in ((), (count,)):
+        raise ValueError(f"{name} has the shape {values.shape}; it must be ({count},), one for each row, or a number "
+                         "for all")
     return numpy.broadcast_to(values, (count,))
 
 

@@ -36,7 +36,7 @@ class Body:
 
 @dataclasses.dataclass
 class Found:
-    """The contacts. `unexplained` is the share of the momentum that they leave unexplained: trust them below 0.001.
+    """The contacts. `unexplained` is the share of the energy of the momentum that they leave: trust them below 0.001.
     `ambiguous` is the share of their impulse that other solutions, which explain the motion as well, do not have."""
 
     trace: Trace

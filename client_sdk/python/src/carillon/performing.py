@@ -261,6 +261,8 @@ class PerformanceCalls(Block):
         indices = [operator.index(item) for item in given]
         for index in indices:
             self._check(index)
+        if len(set(indices)) < len(indices):
+            raise ValueError(f"environments names one twice: {indices}; a mask has booleans, such as done.astype(bool)")
         return indices
 
     def _check(self, index: int) -> None:
@@ -385,6 +387,12 @@ class HearingEnvironment:
         self.observation_space = {"state": getattr(environment, "observation_space", None),
                                   "sound": {"shape": self._shape, "dtype": numpy.float32}}
         self.action_space = getattr(environment, "action_space", None)
+
+    def __getattr__(self, name: str) -> Any:
+        """Whatever else the environment has, such as render, close, spec or metadata."""
+        if name == "environment":
+            raise AttributeError(name)
+        return getattr(self.environment, name)
 
     def reset(self, *, seed: Optional[int] = None, options: Optional[dict[str, Any]] = None
               ) -> tuple[dict[str, Any], dict[str, Any]]:
