@@ -243,11 +243,12 @@ void ContactSearch::Add(Candidate candidate, double time_s, Path path,
   out.push_back(candidate);
 }
 
-/// True if a blow would push against what happens to the bodies there: they part before it, and
-/// more slowly after it than free flight would let them. On its way into a thin body the other one
-/// passes the middle, from where the far side is the nearest.
+/// True if a blow deep inside a body would push against what happens there: the bodies part before
+/// it, and more slowly after it than free flight would let them. On its way into a thin body the
+/// other one passes the middle, from where the far side is the nearest.
 bool ContactSearch::IsOfFarSide(const Candidate& candidate) const {
   const BodyPair& pair = pairs_[candidate.pair];
+  if (candidate.feature.gap_m > -3 * pair.tolerance_m) return false;
   const BodyMotion &a = bodies_.motions[pair.a], &b = bodies_.motions[pair.b];
   const Vector& normal = candidate.feature.normal;
   const size_t first = std::max<size_t>(candidate.frame, 1) - 1;
