@@ -151,7 +151,7 @@ def usual():
     """Two bodies with the settings that Blender gives them: a tilted bar, whose ends a step of the simulation pushes at
     once, and a steel ball, which is too small to be heard and passes the floor by half its radius within a step."""
     scene = empty_scene("usual", 24)
-    scene.carillon.stems = False
+    scene.carillon.stems = scene.carillon.radiation = False
     bpy.ops.rigidbody.world_add()
     add("Ground", 'PASSIVE', (0, 0, -0.05), (4, 4, 0.1)).rigid_body.collision_shape = 'BOX'
     bar = add("Tilted", 'ACTIVE', (0, 0, 0.4), (0.3, 0.04, 0.01), (0, 0.4, 0))
