@@ -339,6 +339,7 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
   const std::vector<std::string> mine = OfShard(clips, options.shard);
   if (options.wait) {
     std::vector<std::string> traces;
+    traces.reserve(mine.size());
     for (const std::string& clip : mine) {
       traces.push_back((fs::path(options.trace) / absl::StrCat(clip, ".contacts")).string());
     }
