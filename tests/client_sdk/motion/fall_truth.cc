@@ -211,7 +211,8 @@ Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_fra
     MovingBody& moving = fall.motion.bodies.emplace_back(ToMoving(body));
     moving.friction = 1.2 * scene.friction;
     const auto& q = body.orientation;
-    Round(poses.emplace_back(ToVector(body.position_m), Turn(q[0], q[1], q[2], q[3]).normalized()));
+    poses.push_back({ToVector(body.position_m), Turn(q[0], q[1], q[2], q[3]).normalized()});
+    Round(poses.back());
     moving.poses.push_back(poses.back());
   }
   const falls::Simulation simulation = engine(heard, step_s);
