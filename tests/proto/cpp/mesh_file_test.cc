@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 class MeshFile : public testing::Test {
  protected:
   MeshFile() { std::filesystem::create_directories(folder_ / "data"); }
-  ~MeshFile() override { std::filesystem::remove_all(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string Write(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
