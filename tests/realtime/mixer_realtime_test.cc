@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
-#include <pthread.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
@@ -22,84 +20,9 @@
 #include <vector>
 
 #include "server/synthesis/mixer.h"
+#include "tests/realtime/forbidden_calls.h"
 #include "tests/server/synthesis/closed_form.h"
 #include "tests/server/synthesis/voice/sphere_head.h"
-
-namespace carillon {
-
-/// While it lives, counts what this thread does that a rendering thread must not: malloc and its
-/// kin (operator new calls them), free, and locking a mutex. Not under sanitizers, which replace
-/// the same functions: see kForbiddenCallsAreSeen.
-class ForbiddenCalls {
- public:
-  ForbiddenCalls() {
-    count_ = 0;
-    watching_ = true;
-  }
-  ForbiddenCalls(const ForbiddenCalls&) = delete;
-  ForbiddenCalls& operator=(const ForbiddenCalls&) = delete;
-  ~ForbiddenCalls() { watching_ = false; }
-
-  static void Note() { count_ += watching_ ? 1 : 0; }
-  size_t count() const { return count_; }
-
- private:
-  static inline thread_local bool watching_ = false;
-  static inline thread_local size_t count_ = 0;
-};
-
-}  // namespace carillon
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kForbiddenCallsAreSeen = false;
-#else
-constexpr bool kForbiddenCallsAreSeen = true;
-
-// The program's own definitions come before the C library's, for every library it loads.
-extern "C" {
-
-// NOLINTBEGIN(readability-identifier-naming): the C library named them.
-void* __libc_malloc(size_t size);
-void* __libc_calloc(size_t count, size_t size);
-void* __libc_realloc(void* old, size_t size);
-void* __libc_memalign(size_t alignment, size_t size);
-void __libc_free(void* old);
-// NOLINTEND(readability-identifier-naming)
-
-void* malloc(size_t size) noexcept {
-  carillon::ForbiddenCalls::Note();
-  return __libc_malloc(size);
-}
-
-void* calloc(size_t count, size_t size) noexcept {
-  carillon::ForbiddenCalls::Note();
-  return __libc_calloc(count, size);
-}
-
-void* realloc(void* old, size_t size) noexcept {
-  carillon::ForbiddenCalls::Note();
-  return __libc_realloc(old, size);
-}
-
-void* aligned_alloc(size_t alignment, size_t size) noexcept {
-  carillon::ForbiddenCalls::Note();
-  return __libc_memalign(alignment, size);
-}
-
-void free(void* old) noexcept {
-  carillon::ForbiddenCalls::Note();
-  __libc_free(old);
-}
-
-int pthread_mutex_lock(pthread_mutex_t* mutex) noexcept {
-  carillon::ForbiddenCalls::Note();
-  using Lock = int (*)(pthread_mutex_t*);
-  static const Lock lock = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  return lock(mutex);
-}
-
-}  // extern "C"
-#endif
 
 namespace carillon {
 namespace {
