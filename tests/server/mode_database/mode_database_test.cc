@@ -229,6 +229,7 @@ TEST_F(ModeDatabaseTest, UnfinishedJobsComeBackInTheOrderTheyWereAskedFor) {
   Reopen();
   std::vector<std::string> digests;
   const auto unfinished = *database_->jobs().Unfinished();
+  digests.reserve(unfinished.size());
   for (const JobRecord& job : unfinished) digests.push_back(job.digest);
   EXPECT_THAT(digests, ElementsAre(b_, a_));
   const auto failed = database_->jobs().Find(c);
