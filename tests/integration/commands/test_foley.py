@@ -2,6 +2,7 @@
 """`carillon foley`: a bar that falls flat on a floor and bounces once is heard when it lands, from a table of poses and
 from a glTF; what is no motion, or not explained by contacts, is refused by name."""
 
+import json
 import re
 
 import numpy
