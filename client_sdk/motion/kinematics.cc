@@ -186,9 +186,7 @@ Vector BodyMotion::VelocityAt(size_t frame, const Vector& arm) const {
   if (!moves()) return Vector::Zero();
   const size_t before = frame > 0 ? frame - 1 : frame;
   const size_t after = std::min(frame, turn_.size() - 1);
-  const Vector velocity = (places_[after + 1].position_m - places_[before].position_m) /
-                          (frame_s_ * static_cast<double>(after + 1 - before));
-  return velocity + ((turn_[before] + turn_[after]) / (2 * frame_s_)).cross(arm);
+  return (MeanVelocity(before, arm) + MeanVelocity(after, arm)) / 2;
 }
 
 Vector BodyMotion::KnownVelocity(size_t interval, double time_s, const Vector& arm) const {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -249,23 +248,21 @@ void MomentumBalance::SolveIsland(std::span<Active> island, double cost_factor, 
     parts.push_back({island[first].part, island.subspan(first, end - first)});
   }
   const double enough_gain = kEnoughShare * energy;
-  const auto solve = [&](const std::function<bool(const Part&)>& in_turn) {
-    std::vector<Part*> now;
-    for (Part& part : parts) {
-      if (part.stale && in_turn(part)) now.push_back(&part);
-    }
-    InParallel(now.size(), [&](size_t i) { SolvePart(*now[i], cost_factor, energy); });
-    for (Part* const part : now) {
-      if (std::exchange(part->gained, 0) <= enough_gain) continue;
-      for (Part& other : parts) other.stale = other.stale || AreNeighbours(*part, other);
-    }
-  };
   constexpr int kMostRounds = 4;
   for (int round = 0; round < kMostRounds; ++round) {
     if (std::ranges::none_of(parts, &Part::stale)) return;
-    solve([](const Part& part) { return part.number != kLongPart && part.number % 2 == 0; });
-    solve([](const Part& part) { return part.number != kLongPart && part.number % 2 == 1; });
-    solve([](const Part& part) { return part.number == kLongPart; });
+    for (const uint32_t turn : {0U, 1U, kLongPart}) {
+      std::vector<Part*> now;
+      for (Part& part : parts) {
+        const uint32_t of = part.number == kLongPart ? kLongPart : part.number % 2;
+        if (part.stale && of == turn) now.push_back(&part);
+      }
+      InParallel(now.size(), [&](size_t i) { SolvePart(*now[i], cost_factor, energy); });
+      for (Part* const part : now) {
+        if (std::exchange(part->gained, 0) <= enough_gain) continue;
+        for (Part& other : parts) other.stale = other.stale || AreNeighbours(*part, other);
+      }
+    }
   }
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // record_jack PORT SECONDS FILE [SERVER SCENE OBJECT WAY STREAMS STRIKES]: records a JACK port as
-// raw 32-bit floats, and prints "recording" once it does, and in the end as JSON what it missed. It
-// ends with standard input or, if it strikes an object of a daemon, after so many streams with so
-// many strikes each. WAY: "stream" (time stamps of now, the usual delay), "ahead" (the same, sent
-// 50 ms before), "arrival" (no delay). It then prints, too, when each strike was sent and each
-// cycle of JACK began, on one clock; jack.py makes latencies of that.
+// raw 32-bit floats. The program prints "recording" when it begins to record, and at the end prints
+// as JSON what it missed. It ends when standard input ends, or after SECONDS. With SERVER it
+// strikes an object of a daemon instead, STRIKES times in each of STREAMS streams, and ends after
+// the last strike. WAY: "stream" (time stamps of now, the usual delay), "ahead" (the same, sent 50
+// ms before), "arrival" (no delay). The JSON then also has the time of each strike and the
+// beginning of each cycle of JACK, on one clock, from which jack.py computes latencies.
 #include <jack/jack.h>
 #include <poll.h>
 #include <time.h>
@@ -96,8 +97,9 @@ class JackCapture {
     return {cycles_.begin(), cycles_.begin() + static_cast<ptrdiff_t>(cycle_count_)};
   }
 
-  /// What was recorded, and what JACK or this client missed meanwhile: cycles, their frames as JACK
-  /// counts them, and xruns. Of one that made several clients late JACK tells for each.
+  /// Returns what the client recorded, and what JACK or this client missed meanwhile: cycles, their
+  /// frames as JACK counts them, and xruns. JACK reports an xrun once for each client that
+  /// it made late.
   std::string ToJson() const;
 
  private:
@@ -184,7 +186,7 @@ struct Arguments {
   int strike_count = 0;
 };
 
-/// What is known of a stream: its strikes' time stamps, and how the daemon says it maps them.
+/// A stream: the time stamps of its strikes, and how the daemon maps them to its own frames.
 struct Stream {
   double first_s = 0;    ///< CLOCK_MONOTONIC, of its first step; time stamps count from here
   double arrived_s = 0;  ///< when the client knew that the daemon had taken that

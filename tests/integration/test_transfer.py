@@ -173,7 +173,7 @@ class TransferTest(ScratchTest):
         omega = math.sqrt(arrays["eigenvalues"][m] * meshes.YOUNG_PA / meshes.DENSITY)
         gain = relative_pressure(arrays, m, omega / SOUND_SPEED * distance_m, direction)
         old, new = (sound.measure(samples, omega / (2 * math.pi), 0.1, 0.4) for samples in (everywhere, heard))
-        if gain > 0.1:  # what is quieter is beside louder modes
+        if gain > 0.1:  # louder modes beside it drown a softer one
             self.assertAlmostEqual(20 * math.log10(new.amplitude / old.amplitude), 20 * math.log10(gain), delta=0.1,
                                    msg=f"mode {m} at {distance_m} m, {direction}")
 

@@ -30,8 +30,8 @@ TEST(Cantilever, BendsTwistsAndStretchesAsTheClosedFormsSay) {
   const BarModes bar{mesh, ModesOf(mesh, kSteel, kSteelDensity, 14'000), kSide / 2, kSide / 2};
   EXPECT_EQ(bar.modes.verification.rigid_mode_count, 0);
   EXPECT_EQ(bar.modes.verification.sturm_count, bar.modes.modes.eigenvalues.size());
-  // Beam theory leaves a clamped section free to grow narrower; fixed as it is, the bar is a little
-  // stiffer: some tenths of its side shorter.
+  // Beam theory lets a clamped section grow narrower. Here the section is fixed, so that the bar is
+  // as stiff as one that is shorter by some tenths of its side.
   const FreeBeam beam = RectangularBeam(kLength, kSide, kSide, kSteel.poisson_ratio);
   const std::vector<double> bending = bar.Of(Family::kBending);
   ExpectSeries(

@@ -32,6 +32,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+std::string TracePath(const RenderOptions& options, const std::string& clip) {
+  return (fs::path(options.trace) / absl::StrCat(clip, ".contacts")).string();
+}
+
 /// Renders one clip after the other. Several threads may use one.
 class ClipRenderer {
  public:
@@ -51,7 +55,7 @@ class ClipRenderer {
 
   /// Returns whether there was anything to do. Errors: those of the trace and of the daemon.
   absl::StatusOr<bool> Render(const std::string& clip) const {
-    const std::string trace = TracePath(clip);
+    const std::string trace = TracePath(options_, clip);
     ClipRecord record;
     record.clip = clip;
     record.settings = settings_;
@@ -83,10 +87,6 @@ class ClipRenderer {
   }
 
  private:
-  std::string TracePath(const std::string& clip) const {
-    return (fs::path(options_.trace) / absl::StrCat(clip, ".contacts")).string();
-  }
-
   /// Reads the labels and the objects of a trace.
   static absl::Status ReadHead(const std::string& path, ClipRecord& clip) {
     ASSIGN_OR_RETURN(client::ContactTraceReader trace, client::ContactTraceReader::Open(path));
@@ -340,9 +340,7 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
   if (options.wait) {
     std::vector<std::string> traces;
     traces.reserve(mine.size());
-    for (const std::string& clip : mine) {
-      traces.push_back((fs::path(options.trace) / absl::StrCat(clip, ".contacts")).string());
-    }
+    for (const std::string& clip : mine) traces.push_back(TracePath(options, clip));
     RETURN_IF_ERROR(AwaitTransfers(daemon, traces));
   }
   ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());

@@ -216,7 +216,7 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop, bool json);
 /// Renders a trace to a file. As JSON, `members` follow the summary. Returns the options by which
-/// another trace is rendered at the same scale, without `normalize`.
+/// another trace of the same objects is rendered at the same scale, without `normalize` and `wait`.
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members = {});
 /// Lets the daemon compute the transfers that the objects of traces lack, and shows the progress.

@@ -33,7 +33,9 @@ void PrintFindings(const RenderOptions& options, const v1::RenderSummary& summar
     absl::FPrintF(
         out,
         "%s sounding by the paper's coupling, whose levels are not physical, for lack of a "
-        "transfer for the material: with --wait it is computed first\n",
+        "transfer for the material: `carillon transfer` computes it, and so does --wait of "
+        "`carillon "
+        "render` and `carillon foley`\n",
         Counted(summary.paper_coupling_object_count(), "object"));
   }
   if (!options.normalize && summary.peak() > 0 && summary.peak() < kFaint) {
@@ -229,6 +231,7 @@ absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderO
   }
   RenderOptions alike = options;
   alike.normalize = false;
+  alike.wait = false;  // the transfers are there now
   alike.gain = file.factor();
   if (settings.has_full_scale_pa()) alike.full_scale_pa = settings.full_scale_pa();
   return alike;

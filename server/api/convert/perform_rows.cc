@@ -10,12 +10,10 @@
 #include "server/api/convert/contact_conversion.h"
 #include "server/api/convert/contact_fields.h"
 #include "server/api/convert/hertz_contact_conversion.h"
+#include "server/scene/offline/environment.h"
 
 namespace carillon {
 namespace {
-
-/// What an environment has places for in a step (Environment).
-constexpr size_t kMostEvents = 512;
 
 absl::Status Invalid(absl::string_view reason, absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, reason, message);
@@ -151,7 +149,7 @@ void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& int
     const v1::MicrophonePoses& poses = step_.microphone_poses();
     if (poses.microphone(row) == microphone) intake.MoveListener(ReadPose(poses, row));
   }
-  size_t room = kMostEvents;
+  size_t room = Environment::kMostEvents;
   for (const Contacts& contacts : contacts_) {
     const std::span<const int> rows = contacts.rows.of(environment);
     const size_t events_per_row = contacts.columns->second_object().empty() ? 1 : 2;
@@ -161,7 +159,7 @@ void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& int
     if (taken_count == rows.size()) continue;
     intake.Reject(rows.size() - taken_count,
                   Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CONTACTS",
-                          absl::StrCat("an environment takes ", kMostEvents,
+                          absl::StrCat("an environment takes ", Environment::kMostEvents,
                                        " contacts in a step, of which those with a second object "
                                        "count twice; report fewer points")));
   }

@@ -12,9 +12,6 @@ namespace {
 
 /// The shortest blocks into which a step is divided.
 constexpr size_t kShortBlock = 16;
-/// Most events of an environment that fall into the blocks rendered together.
-constexpr size_t kMostEvents = 512;
-
 /// Returns the largest divisor of a number of frames that suits a block, or zero. The longer the
 /// blocks, the less often the fixed cost of a block comes up.
 size_t BlockThatDivides(size_t frame_count) {

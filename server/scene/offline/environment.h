@@ -44,6 +44,9 @@ StepTiming TimingOf(const EnvironmentSettings& settings);
 /// microphone hears its own rendering. Only one thread at a time may use an object.
 class Environment {
  public:
+  /// Most events that fall into the blocks rendered together, and therefore of a step.
+  static constexpr size_t kMostEvents = 512;
+
   /// `bodies` and `transfers` must outlive this. `balances` is as of IntakeSettings. Reset must be
   /// called first.
   Environment(const EnvironmentSettings& settings, BodyCache& bodies, TransferStore* transfers,

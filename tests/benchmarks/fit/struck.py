@@ -8,7 +8,7 @@ import bodies
 import numpy
 
 RATE_HZ = 48000
-AROUND = 48  # corners of what is turned
+AROUND = 48  # corners of each circle of a turned body
 SECONDS = 1.5
 NU_OF_MODELS = 0.28
 # E in Pa, density, and the law of damping: "eta" and a loss factor, "rayleigh" and alpha1, alpha2, "table".

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The adapters in C++, each with its engine: two balls of 1 kg meet without weight. The left one
-// flies to the right at 1 m/s. The right one is turned by a quarter about z, so that in its frame x
-// of the world is -y.
+// flies to the right at 1 m/s. The right one is turned by a quarter about z, so that the world's x
+// axis is the -y axis of its frame.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -43,7 +43,7 @@ v1::Job Bell(v1::JobState state, char job = 'a', char model = 'a') {
   return bell;
 }
 
-/// What is said of a model that is not there while the daemon has the job.
+/// Returns the message of the error for a model that is not stored, while the daemon has the job.
 std::string MessageOf(const v1::Job& job, const std::string& text) {
   FakeDaemon daemon;
   *daemon.jobs.add_jobs() = job;

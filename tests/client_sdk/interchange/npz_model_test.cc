@@ -151,8 +151,8 @@ double Coupling(float a, float b, float c) {
   return model.couplings.at(0);
 }
 
-/// sqrt(4) times the integral of |f| over the triangle, by cells so small that what is left of the
-/// error comes of those that the zero of f crosses: 1e-5.
+/// Returns sqrt(4) times the integral of |f| over the triangle, summed over small cells. The zero
+/// of f crosses some of these cells, which make an error of 1e-5.
 double CouplingByCells(double a, double b, double c) {
   constexpr int kCells = 1000;
   double sum = 0;

@@ -363,8 +363,9 @@ falls::FallScene AirScene() {
   return {.friction = 0.5, .restitution = 0.3, .seconds = 0.5, .bodies = {FloorBody(), one, two}};
 }
 
-/// Six hollow blocks of wood in a pile, and a ball that rolls into them (scene_makers.py).
-falls::FallScene BlocksScene() {
+/// Six hollow blocks of wood in a pile, and a ball that rolls into them (scene_makers.py). In each
+/// further pile the ball starts 3 mm farther away.
+falls::FallScene BlocksScene(int pile) {
   constexpr double kSide = 0.05;
   const double mass = 550 * std::pow(kSide, 3) * (1 - std::pow(0.9, 3)), radius = 0.6 * kSide;
   falls::FallScene scene{
@@ -378,7 +379,7 @@ falls::FallScene BlocksScene() {
     }
   }
   falls::Body ball = BallBody("ball", radius, 3 * mass);
-  ball.position_m = {-8 * kSide, 0.1 * kSide, radius};
+  ball.position_m = {-8 * kSide - 0.003 * pile, 0.1 * kSide, radius};
   ball.velocity_m_per_s = {2, 0, 0};
   ball.angular_velocity_rad_per_s = {0, 2 / radius, 0};
   scene.bodies.push_back(ball);

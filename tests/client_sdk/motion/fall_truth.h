@@ -57,6 +57,6 @@ MovingBody ToMoving(const falls::Body& body);
 falls::FallScene CornerScene();
 falls::FallScene BounceScene();
 falls::FallScene AirScene();
-falls::FallScene BlocksScene();
+falls::FallScene BlocksScene(int pile = 0);
 
 }  // namespace carillon::motion

@@ -123,8 +123,8 @@ BodySurface DiscSurface() {
 }
 
 // A disc lands on its rim after 0.173 s and, within one frame in which it falls by more than the
-// table is thick, three times from 0.392 s on. The poses are those of exact flights between bounces
-// of a restitution of 0.5 and a friction of 0.4.
+// table is thick, three times from 0.392 s on. The poses are exact flights between bounces whose
+// restitution is 0.5 and whose friction is 0.4.
 TEST(FindContacts, TheFarSideOfAThinTableDoesNotPullADiscDown) {
   constexpr double kPoses[][3] = {
       {0, 0.205555, 1.095448},         {0.003333, 0.200105, 1.145074},
@@ -226,9 +226,7 @@ TEST(FindContacts, FindsMostOfPilesAtSixtyFramesAndCallsThemAmbiguous) {
   constexpr int kPiles = 4;
   double found_share = 0, false_share = 0;
   for (int i = 0; i < kPiles; ++i) {
-    falls::FallScene scene = BlocksScene();
-    scene.bodies.back().position_m[0] -= 0.003 * i;
-    const Fall fall = Drop(scene, falls::FallInBullet, 40);
+    const Fall fall = Drop(BlocksScene(i), falls::FallInBullet, 40);
     const FoundContacts found = FindContacts(fall.motion).value();
     const Likeness is = Compare(fall, found);
     found_share += is.found_share / kPiles;

@@ -32,8 +32,8 @@ inline double EnergyDensity() {
   return kLame.lambda_pa / 2 * strain.trace() * strain.trace() + kLame.mu_pa * strain.squaredNorm();
 }
 
-/// Expects exactly six motions without energy, and that the displacement of this gradient has that
-/// of elasticity.
+/// Expects that exactly six motions have no energy, and that a displacement of constant gradient
+/// has the energy that the theory of elasticity gives.
 template <int N>
 void ExpectStiffness(const Eigen::Matrix<double, 3 * N, 3 * N>& k, const TenNodes& nodes,
                      double volume_m3, double rounding) {

@@ -133,7 +133,7 @@ TEST(ResolveMaterial, RegionsHaveAnOrderAndTheFirstIsTheReference) {
   EXPECT_EQ(resolved.regions(0).region(), "handle");
   EXPECT_EQ(resolved.young_pa(), 12e9);
   EXPECT_EQ(resolved.regions(1).material().young_pa(), 210e9);
-  // What was resolved may be resolved again.
+  // A resolved material may be resolved again.
   EXPECT_EQ(ResolveMaterial(resolved)->SerializeAsString(), resolved.SerializeAsString());
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What is written as a text: fixtures, the requests of workers, and addresses.
+// The text forms of fixtures, of the requests of workers, and of addresses.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

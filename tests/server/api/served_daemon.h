@@ -39,7 +39,7 @@ using SceneStub = v1::SceneService::Stub;
 template <typename Stub, typename Request, typename Response>
 using Method = grpc::Status (Stub::*)(grpc::ClientContext*, const Request&, Response*);
 
-/// The request about what has a name.
+/// Returns a request of a call that takes a name alone.
 template <typename Request>
 Request Named(const std::string& name) {
   Request request;

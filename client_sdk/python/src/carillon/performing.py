@@ -390,7 +390,7 @@ class HearingEnvironment:
 
     def __getattr__(self, name: str) -> Any:
         """Whatever else the environment has, such as render, close, spec or metadata."""
-        if name == "environment":
+        if name == "environment":  # before __init__, as in a copy
             raise AttributeError(name)
         return getattr(self.environment, name)
 
