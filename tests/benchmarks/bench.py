@@ -55,17 +55,12 @@ def cpu_s(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def decomposed(build, mesh, out, *options, **run_options):
-    """The report of carillon-precompute, which may be an error."""
-    command = [build / "bin/carillon-precompute", mesh, "--out", out, "--json", *options]
-    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                          check=False, **run_options)
-    return json.loads(done.stdout)
-
-
 def decompose(build, mesh, out, *options):
     """The report of carillon-precompute. Ends the benchmark if there is no model."""
-    report = decomposed(build, mesh, out, *options)
+    command = [build / "bin/carillon-precompute", mesh, "--out", out, "--json", *options]
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                          check=False)
+    report = json.loads(done.stdout)
     if "error" in report:
         sys.exit(f"{mesh}: {report['error']}")
     return report

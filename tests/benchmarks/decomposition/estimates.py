@@ -13,6 +13,7 @@ import users
 from scipy import optimize, spatial
 
 FINER, MOST_NODES, MOST_SECONDS = 4, 300_000, 1200
+NODES_PER_CORNER = 7
 # Below a cent, which nobody hears, an error is not judged.
 SMALLEST_ERROR = 5.8e-4
 SAMPLES = 400
@@ -127,7 +128,7 @@ class Solver:
 
     def finer(self, nodes):
         """A mesh of four times the nodes. Its band is stated, so that it has all modes whatever they cost."""
-        return self.run("finer", "--nodes", str(min(FINER * nodes, MOST_NODES) // users.NODES_PER_CORNER),
+        return self.run("finer", "--nodes", str(min(FINER * nodes, MOST_NODES) // NODES_PER_CORNER),
                         "--band", "20:20000")
 
 

@@ -52,16 +52,14 @@ inline Eigen::SparseMatrix<double> ReadSparse(const std::string& path) {
       size, size, static_cast<Eigen::Index>(value.size()), start.data(), row.data(), value.data());
 }
 
-/// Writes eigenvalues and shapes (column-major) into `folder` and prints the times, and `more`,
-/// which is empty or further members of the JSON object with a comma before each.
+/// Writes eigenvalues and shapes (column-major) into `folder` and prints the times.
 inline void Report(const Stopwatch& watch, const std::string& folder,
-                   const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes,
-                   const std::string& more = "") {
+                   const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& shapes) {
   const double cpu_seconds = watch.CpuSeconds();
   const double seconds = watch.Seconds();
   WriteArray(folder + "/eigenvalues", eigenvalues.data(), static_cast<size_t>(eigenvalues.size()));
   WriteArray(folder + "/shapes", shapes.data(), static_cast<size_t>(shapes.size()));
-  std::printf("{\"cpu_seconds\": %.3f, \"seconds\": %.3f%s}\n", cpu_seconds, seconds, more.c_str());
+  std::printf("{\"cpu_seconds\": %.3f, \"seconds\": %.3f}\n", cpu_seconds, seconds);
 }
 
 }  // namespace carillon

@@ -5,14 +5,13 @@
 Each part prints a Markdown table:
   compare   SLEPc and Spectra on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
-  growth    time and memory over the number of nodes, up to a million with --full
-  estimates stated and true errors of every mode of twelve bodies, six of them with re-entrant corners, with the
-            defaults and for accuracies of 3 % and 1 %
-  bodies    thirty bodies as users have them, with the defaults: verdict, cost, stated and true errors
-  packages  the closed surfaces of some Debian packages, with --repair: the share that ends in a model
+  estimates stated and true errors of every mode of nineteen bodies, with the defaults and for accuracies of 3 % and
+            1 %
+  bodies    bodies as users have them, with the defaults: verdict, cost, stated errors; with --full meshes of growing
+            size, up to a million nodes
 
-Nothing is kept from one run to the next, but for what `packages` adds to the file of --results. Slow programs on
-large bodies run with --full only, or where --peers names them. CPU seconds are those of one thread for everybody.
+Slow programs on large bodies run with --full only, or where --peers names them. CPU seconds are those of one thread
+for everybody.
 """
 
 import os
@@ -25,8 +24,6 @@ import bench  # noqa: E402
 import calculix  # noqa: E402
 import compare  # noqa: E402
 import estimates  # noqa: E402
-import growth  # noqa: E402
-import packages  # noqa: E402
 import users  # noqa: E402
 
 
@@ -42,9 +39,9 @@ def fair_environment():
     return environment
 
 
-PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies, "growth": growth.growth,
-         "estimates": estimates.estimates, "bodies": users.users, "packages": packages.packages}
-HOURS = ("estimates", "bodies", "packages")  # take from half an hour to two hours
+PARTS = {"compare": compare.compare, "calculix": calculix.compare_frequencies, "estimates": estimates.estimates,
+         "bodies": users.users}
+HOURS = ("estimates", "bodies")  # take from half an hour to two hours
 
 
 def main():
@@ -54,8 +51,6 @@ def main():
                         help=f"some of {','.join(PARTS)}; all but {','.join(HOURS)} unless named")
     parser.add_argument("--only", type=bench.names, default=[], help="bodies, by name")
     parser.add_argument("--peers", type=bench.names, default=[], help="other programs, by name")
-    parser.add_argument("--results", type=pathlib.Path,
-                        help="where `packages` keeps each outcome, to go on from there (one JSON object a line)")
     options = parser.parse_args()
     for part in options.parts:
         print(f"\n## {part}\n", flush=True)

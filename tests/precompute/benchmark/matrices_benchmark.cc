@@ -8,7 +8,6 @@
 // `make` meshes a surface, keeping its vertices, and writes the mesh and its matrices; `solve`
 // reads the matrices and finds every mode up to a frequency.
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <exception>
@@ -16,7 +15,6 @@
 #include <string>
 #include <string_view>
 
-#include "absl/strings/str_format.h"
 #include "precompute/fem/assembly.h"
 #include "precompute/mesh/fill/tetrahedralize.h"
 #include "precompute/mesh/read/read_mesh.h"
@@ -53,42 +51,6 @@ int Make(char** argv) {
   return EXIT_SUCCESS;
 }
 
-/// Attributes the processor time between two reports of progress to the stage of the first.
-class StageTimes {
- public:
-  explicit StageTimes(const Stopwatch& watch) : watch_(watch) {}
-
-  void Enter(SolveStage stage) {
-    const double now = watch_.CpuSeconds();
-    seconds_[at_] += now - since_;
-    since_ = now;
-    if (stage == SolveStage::kFactor) at_ = kFactor;
-    if (stage == SolveStage::kSolve) at_ = kSolve;
-    // Counting is the first part of the stage kVerify.
-    if (stage == SolveStage::kVerify && at_ != kCount) at_ = kVerify;
-  }
-
-  /// Returns the seconds and the work as members of a JSON object.
-  std::string Members(const SolveWork& work) {
-    Enter(SolveStage::kVerify);
-    return absl::StrFormat(
-        ", \"count_s\": %.4f, \"factor_s\": %.4f, \"solve_s\": %.4f, \"verify_s\": %.4f, "
-        "\"factor_multiply_adds\": %.6g, \"factor_entries\": %.6g, \"unknowns\": %.6g, "
-        "\"basis_size\": %d",
-        seconds_[kCount], seconds_[kFactor], seconds_[kSolve], seconds_[kVerify],
-        work.factor_multiply_adds, work.factor_entries, work.unknowns, work.basis_size);
-  }
-
- private:
-  /// kCount has the ordering, too.
-  enum Stage { kCount, kFactor, kSolve, kVerify };
-
-  const Stopwatch& watch_;
-  std::array<double, 4> seconds_{};
-  double since_ = 0;
-  Stage at_ = kCount;
-};
-
 int Solve(char** argv) {
   const std::string folder = argv[0];
   const double omega = 2 * std::numbers::pi * std::atof(argv[1]);
@@ -96,11 +58,9 @@ int Solve(char** argv) {
   const SystemMatrices system{.K = ReadSparse(folder + "/K"), .M = ReadSparse(folder + "/M")};
   const auto nodes = ReadArray<Point>(folder + "/nodes");
   const Stopwatch watch;
-  StageTimes stages(watch);
-  const DeformationModes solution = ValueOrThrow(SolveDeformationModes(
-      system, nodes, omega * omega, [&](SolveStage stage, double) { stages.Enter(stage); }));
-  Report(watch, folder, solution.modes.eigenvalues, solution.modes.shapes,
-         stages.Members(solution.work));
+  const DeformationModes solution =
+      ValueOrThrow(SolveDeformationModes(system, nodes, omega * omega, [](SolveStage, double) {}));
+  Report(watch, folder, solution.modes.eigenvalues, solution.modes.shapes);
   return EXIT_SUCCESS;
 }
 

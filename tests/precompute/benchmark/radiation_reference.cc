@@ -3,10 +3,8 @@
 // radiation_reference MODEL SPEED_RATIO ACCURACY_DB BUDGET_S EVERY GREATEST_VERTEX_COUNT
 //
 // Computes how the modes of a stored modal model radiate, in one thread, then every EVERY-th of
-// them anew on a surface with edges half as long, and one of them by an assembled matrix that is
-// factorized. Prints one JSON object. Modes whose finer surface would have more vertices than
-// GREATEST_VERTEX_COUNT are not computed anew.
-#include <Eigen/Dense>
+// them anew on a surface with edges half as long. Prints one JSON object. Modes whose finer surface
+// would have more vertices than GREATEST_VERTEX_COUNT are not computed anew.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -19,10 +17,8 @@
 #include "precompute/codec/read_modal_model.h"
 #include "precompute/radiation/far_pattern.h"
 #include "precompute/radiation/solve_radiation.h"
-#include "precompute/radiation/solve_time.h"
 #include "precompute/radiation/surface_levels.h"
 #include "precompute/radiation/transfer.h"
-#include "tests/precompute/radiation/dense_equation.h"
 
 namespace carillon::precompute {
 namespace {
@@ -30,8 +26,6 @@ namespace {
 /// The greatest wavenumber of sounds that are heard: 20 kHz.
 const double kGreatestWavenumber = 2 * std::numbers::pi * 20000 / Air().sound_speed_m_per_s;
 constexpr double kReferenceTolerance = 3e-3;
-/// A matrix of more rows would take more than 1 GB beside its factors.
-constexpr int kMostDenseRows = 4000;
 
 template <class T>
 T ValueOrExit(absl::StatusOr<T> result) {
@@ -69,29 +63,6 @@ class Reference {
             {"stated_direction_db", mode.direction_error_db}};
   }
 
-  /// CPU seconds of one mode by sweeps, and by the same equation assembled and factorized.
-  nlohmann::json BesideDense(size_t number) {
-    const ModeRadiation& mode = transfer_.modes[number];
-    const RemeshedSurface& level = ValueOrExit(levels_.At(levels_.LevelOf(mode.edge_m)))->level;
-    const SphereGrid grid(PatternOrder(mode.wavenumber, body_.radius_m));
-    double begun_s = CpuSeconds();
-    const ModeField field =
-        SolveRadiation(ProblemOf(number, level), level, body_, grid, workers_).front();
-    const double sweeps_s = CpuSeconds() - begun_s;
-    begun_s = CpuSeconds();
-    const Eigen::MatrixXcf matrix =
-        AssembleDense(level.surface, level.near, mode.wavenumber, body_.radius_m)
-            .cast<ComplexFloat>();
-    const double assembly_s = CpuSeconds() - begun_s;
-    begun_s = CpuSeconds();
-    const Eigen::PartialPivLU<Eigen::MatrixXcf> factors(matrix);
-    return {{"vertices", level.surface.vertex_count()},
-            {"iterations", field.iterations},
-            {"sweeps_s", sweeps_s},
-            {"assembly_s", assembly_s},
-            {"factors_s", CpuSeconds() - begun_s}};
-  }
-
  private:
   ModeProblem ProblemOf(size_t number, const RemeshedSurface& level) const {
     ModeProblem problem{.wavenumber = transfer_.modes[number].wavenumber,
@@ -113,15 +84,10 @@ nlohmann::json MeasureBody(const SurfaceModes& modes, const RadiationSettings& s
                            size_t every, int most_vertices) {
   const Transfer transfer = ValueOrExit(ComputeTransfer(modes, settings, [](double) {}));
   Reference reference(modes, transfer);
-  nlohmann::json report = {{"cpu_s", transfer.cpu_s}, {"checked", nlohmann::json::array()}};
-  size_t wanted = 0, computed = 0, too_large = 0, dense = modes.mode_count();
+  nlohmann::json report = {{"checked", nlohmann::json::array()}};
+  size_t computed = 0, too_large = 0;
   for (size_t m = 0; m < modes.mode_count(); ++m) {
-    const ModeRadiation& mode = transfer.modes[m];
-    if (mode.in_band) ++wanted;
-    if (!mode.computed) continue;
-    // The middle one of those that fit.
-    if (mode.vertex_count <= kMostDenseRows && 2 * m <= modes.mode_count()) dense = m;
-    if (computed++ % every != 0) continue;
+    if (!transfer.modes[m].computed || computed++ % every != 0) continue;
     nlohmann::json checked = reference.Check(m, most_vertices);
     if (checked.is_null()) {
       ++too_large;
@@ -129,8 +95,7 @@ nlohmann::json MeasureBody(const SurfaceModes& modes, const RadiationSettings& s
       report["checked"].push_back(std::move(checked));
     }
   }
-  report.update({{"wanted", wanted}, {"computed", computed}, {"too_large", too_large}});
-  if (dense < modes.mode_count()) report["dense"] = reference.BesideDense(dense);
+  report.update({{"computed", computed}, {"too_large", too_large}});
   return report;
 }
 
