@@ -1,10 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""How well `carillon material fit` finds materials: sounds of bodies whose material is known, the recorded steel bar,
-a block whose resonances are published, and recordings held against the mesh of another body.
+"""How well `carillon material fit` finds materials: sounds of bodies whose material is known, a block whose
+resonances are published, and sounds held against the mesh of another body.
 
-    run.py --build BUILD [--recordings FOLDER] [--rows hard60,hard40,...] [--draws 0,1,...]
-           [--parts table,wrong,bar,block]
+    run.py --build BUILD [--rows hard60,hard40,...] [--draws 0,1,...] [--parts table,wrong,block]
 
 Prints Markdown tables. A sound is the closed form of a struck body whose frequencies are jittered by 0.15 %, which
 stands for what a mesh misses, decomposed at another Poisson's ratio than that of the model.
@@ -32,8 +31,6 @@ ROWS = {f"{name}{noise}{'room' * room}": (span, noise, room)
 STRIKES, JITTER = 2, 0.0015
 MOST_ERROR = 0.45  # relative, of decays that the fit takes for known
 ROOM_T60_S, ROOM_LEVEL_DB = (0.25, 0.7), (-12, -6)
-# The bar of ../../../../shared/recordings: its size and its mass.
-BAR_SIZE_M, BAR_MASS_KG, BAR_YOUNG_PA = (0.11436, 0.02544, 0.00312), 0.0713, 214.6e9
 
 # Resonances that Ogi, Sato, Asada and Hirao measured on a block of an aluminium alloy (J. Acoust. Soc. Am. 112, 2553,
 # 2002), kHz, and its constants.
@@ -257,23 +254,6 @@ def show_wrong(studio):
     print(f"\nAgainst the mesh of another body {len(refused)} of {len(outcomes)} were refused: {reasons}.")
 
 
-def show_bar(studio, recordings):
-    recording = recordings / "steel_bar_114x25.4x3.12mm.wav"
-    if not recording.exists():
-        print("\nThe recording of the bar is missing.")
-        return
-    model = studio.decompose("steel_bar", struck.box(*BAR_SIZE_M), 210e9, 7855, 0.28, "--band", "20:22000",
-                             "--accuracy", "0.5%")
-    answer, refusal, cpu_s = studio.fit(studio.store(model), recording, "--mass", BAR_MASS_KG)
-    if answer is None:
-        print(f"\nThe steel bar: {refusal}")
-        return
-    off = 100 * (answer["young_pa"] / BAR_YOUNG_PA - 1)
-    print(f"\nThe steel bar: E {answer['young_pa'] / 1e9:.1f} GPa ({off:+.2f} % of 214.6), "
-          f"nu {answer['poisson_ratio']:.3f}, {answer['matched']} of {len(answer['lines'])} lines, "
-          f"{100 * answer['rms']:.2f} % apart, log odds {answer['log_odds']:.1f}, {cpu_s:.1f} s of CPU.")
-
-
 def show_block(studio):
     """Ogi's block, of which frequencies alone are known."""
     name = studio.store(studio.decompose("block", struck.box(*OGI_SIZE_M), 70e9, OGI_DENSITY, 0.33, "--band",
@@ -292,10 +272,9 @@ def show_block(studio):
 
 def main():
     parser = bench.parser(__doc__)
-    parser.add_argument("--recordings", type=pathlib.Path, default=HERE.parents[3] / "shared/recordings")
     parser.add_argument("--rows", default=",".join(ROWS))
     parser.add_argument("--draws", default="0", help="numbers, each of which draws other strikes and rooms")
-    parser.add_argument("--parts", default="table,wrong,bar,block")
+    parser.add_argument("--parts", default="table,wrong,block")
     options = parser.parse_args()
     bench.use(options.build)
     started = time.monotonic()
@@ -305,8 +284,6 @@ def main():
             show_table(studio, options.rows.split(","), [int(draw) for draw in options.draws.split(",")])
         if "wrong" in options.parts:
             show_wrong(studio)
-        if "bar" in options.parts:
-            show_bar(studio, options.recordings)
         if "block" in options.parts:
             show_block(studio)
     print(f"\n{time.monotonic() - started:.0f} s.")
