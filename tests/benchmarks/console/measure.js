@@ -97,7 +97,6 @@ function watchRing() {
 }
 
 async function inPage(work) {
-  const began = Date.now();
   const console = await startConsole();
   const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: process.getuid() === 0 ? ['--no-sandbox'] : [] });
   try {
@@ -105,7 +104,7 @@ async function inPage(work) {
     page.setDefaultTimeout(300000);
     page.on('pageerror', (error) => process.stderr.write(`${error.stack}\n`));
     await page.addInitScript(instrument);
-    await work(page, console.address, began);
+    await work(page, console.address);
   } finally {
     await browser.close();
     await console.stop();
@@ -121,32 +120,6 @@ const isReady = () => carillonConsole.state.model.value && !carillonConsole.stat
 const isDone = () => carillonConsole.state.model.value && !carillonConsole.state.busy.value && !carillonConsole.state.upload.value;
 
 const measurements = {
-  /** From the command to the first strike of a dropped file that the audio thread plays. */
-  first: () => inPage(async (page, address, began) => {
-    await page.goto(address);
-    await page.waitForFunction(() => carillonConsole.state.reached.value && !carillonConsole.state.busy.value);
-    const shown = Date.now() - began;
-    const bytes = fs.readFileSync(process.env.MESH).toString('base64');
-    await page.evaluate((base64) => {
-      const transfer = new DataTransfer();
-      transfer.items.add(new File([Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))], 'bowl.stl'));
-      dispatchEvent(new DragEvent('drop', { dataTransfer: transfer }));
-    }, bytes);
-    const dropped = Date.now() - began;
-    await page.waitForFunction(isReady);
-    const ready = Date.now() - began;
-    const coarse = await page.evaluate(() => carillonConsole.state.coarse.value);
-    await clickBody(page);
-    await page.waitForFunction(async () => carillonConsole.player.analyser && (() => {
-      const samples = new Float32Array(4096);
-      carillonConsole.player.analyser.getFloatTimeDomainData(samples);
-      return samples.some((sample) => Math.abs(sample) > 1e-7);
-    })());
-    const heard = Date.now() - began;
-    await page.waitForFunction(isDone);
-    tell({ page_ms: shown, dropped_ms: dropped, struckable_ms: ready, was_coarse: coarse, heard_ms: heard, fine_ms: Date.now() - began });
-  }),
-
   /** From a click to the ring, the audio thread's message and the browser's output, with a body that rings briefly. */
   clicks: () => inPage(async (page, address) => {
     await page.goto(address);
@@ -208,82 +181,6 @@ const measurements = {
     tell({ seconds, gaps, browser_gaps: browserGaps, gaps_before: before, lost_frames: lost, target_frames: target, cpu_percent: share,
       // Chromium keeps an empty renderer in reserve.
       memory_mib: Object.fromEntries(Object.entries(kinds).map(([kind, pids]) => [kind, Math.max(...pids.map(memoryMib))])) });
-  }),
-
-  /** From the end of the daemon, which run.py starts again, to a page that can strike, and to sound. */
-  restart: () => inPage(async (page, address) => {
-    await page.goto(address);
-    await page.waitForFunction(() => carillonConsole.state.reached.value && !carillonConsole.state.busy.value);
-    await page.locator('input[type=file]').setInputFiles(process.env.MESH);
-    await page.waitForFunction(isDone);
-    await clickBody(page);
-    await page.waitForFunction(() => carillonConsole.player.node);
-    const scene = await page.evaluate(() => carillonConsole.state.sceneName());
-    const began = Date.now();
-    process.kill(Number(process.env.CARILLON_DAEMON_PID), 'SIGKILL');
-    await page.waitForFunction((old) => carillonConsole.state.sceneName() !== old && !carillonConsole.state.busy.value, scene, { polling: 20 });
-    const struckable = Date.now() - began;
-    const heard = page.evaluate(() => new Promise((resolve) => {
-      const { player } = carillonConsole;
-      player.onSamples = (samples) => { if (samples.some((sample) => Math.abs(sample) > 1e-7)) resolve(Date.now()); };
-      player.observe({ tap: true });
-    }));
-    await clickBody(page);
-    tell({ struckable_ms: struckable, heard_ms: await heard - began, faults: await page.locator('.fault').count() });
-  }),
-
-  /** A model of 100,000 vertices and 800 modes; the CPU of all processes tells more than the time on a busy machine. */
-  large: () => inPage(async (page, address) => {
-    await page.goto(address);
-    await page.waitForFunction(() => carillonConsole.state.models.value.length && !carillonConsole.state.busy.value);
-    const kinds = processes();
-    const cpu = () => Object.values(kinds).reduce((sum, pids) => sum + total(pids, cpuSeconds), 0);
-    const timed = async (name, work, wanted) => {
-      const before = cpu();
-      const ms = await page.evaluate(work, wanted);
-      tell({ what: name, ms: round(ms), cpu_ms: round(1000 * (cpu() - before)), daemon_mib: memoryMib(kinds.daemon[0]) });
-    };
-    await timed('first picture', async () => {
-      const { state, view } = carillonConsole;
-      view().paused = true;  // the motion by software would take the time that is measured
-      const was = state.model.value;
-      const before = performance.now();
-      globalThis.opened = state.openModel(state.models.value.find((one) => one.label === 'large').name);
-      while (state.model.value === was) await new Promise((resolve) => { setTimeout(resolve, 1); });
-      view().paused = false;
-      view().budget.restsUntilMs = 0;
-      view().draw(performance.now());
-      view().paused = true;
-      return performance.now() - before;
-    });
-    await timed('struckable', async () => {
-      const before = performance.now();
-      await opened;
-      if (carillonConsole.state.fault.value) throw new Error(carillonConsole.state.fault.value.message);
-      return performance.now() - before;
-    });
-    for (const mode of [0, 100, 300, 500, 799]) {
-      await timed(`mode ${mode}`, async (wanted) => {
-        const { state, view } = carillonConsole;
-        const before = performance.now();
-        await view().showMode(state.modes.value[wanted]);
-        view().paused = false;
-        view().budget.restsUntilMs = 0;
-        view().draw(performance.now());
-        view().paused = true;
-        return performance.now() - before;
-      }, mode);
-    }
-    const picks = await page.evaluate(() => [...Array(20).keys()].map((i) => {
-      const before = performance.now();
-      carillonConsole.view().pick(0.01 * i, 0);
-      return performance.now() - before;
-    }));
-    tell({ what: 'find a point', first_ms: round(picks[0]), median_ms: quantile(picks, 0.5) });
-    await clickBody(page);
-    await page.waitForFunction(() => carillonConsole.state.row.value);
-    await sleep(2000);
-    tell({ tab_mib: Math.max(...processes().renderer.map(memoryMib)), heap_mib: round(await page.evaluate(() => performance.memory.usedJSHeapSize / 1048576)) });
   }),
 };
 

@@ -6,7 +6,8 @@
 
 Writes REPRODUCTION.md with pictures/figure3.png, figure4.png, figure5.png and sound_models.png, and six sounds into
 BUILD/paper. Exits with 1, without the page, where an error in print is refuted, a chime is off by more than 2 % from
-the measured one or, with linear elements, 1.5 % from the computed one, or one that was tuned is off by 1 Hz. deploy/paper.sh installs what this needs.
+the measured one or, with linear elements, 1.5 % from the computed one, or one that was tuned is off by 1 Hz.
+deploy/paper.sh installs what this needs.
 """
 
 import json
