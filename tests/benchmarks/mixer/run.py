@@ -92,30 +92,7 @@ def flood(options, _folder):
     print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
 
 
-def latency(options, folder):
-    bench.use(options.build)
-    import jack
-    print("\n## From a strike at the client to its first sample in a JACK capture, ms\n")
-    bench.print_head("time stamp, blocks ahead", "strikes", "delay + look-ahead, as stated", "p50", "p99", "p99.9",
-                     "least, most", "came too late", "in place to the sample", "JACK cycles missed, xruns")
-    names = {"stream": "now", "ahead": "50 ms before", "arrival": "now, no delay"}
-    for blocks in (8, 2):
-        scratch = folder / str(blocks)
-        scratch.mkdir()
-        measurement = jack.LatencyMeasurement(scratch, "--look-ahead-blocks", blocks)
-        try:
-            for way in jack.LatencyMeasurement.WAYS:
-                found = measurement.measure(way, *options.latency_strikes)
-                bench.print_row(f"{names[way]}, {blocks}", found["strikes"],
-                                f"{found['delay_ms']:.2f} + {found['stated_ms'] - found['delay_ms']:.2f}",
-                                *(f"{found[name]:.2f}" for name in ("p50_ms", "p99_ms", "p999_ms")),
-                                f"{found['least_ms']:.2f}, {found['most_ms']:.2f}", found["late"], found["in_place"],
-                                f"{found['missed_cycles']}, {found['xruns']}")
-        finally:
-            measurement.stop()
-
-
-PARTS = {"ringing": ringing, "directed": directed, "flood": flood, "latency": latency}
+PARTS = {"ringing": ringing, "directed": directed, "flood": flood}
 
 
 def main():
@@ -125,8 +102,6 @@ def main():
                         help="of sound, for each measurement of 80,000 modes or more; of fewer it is longer")
     parser.add_argument("--turns", type=int, default=5, help="of measurements of modes")
     parser.add_argument("--flood-seconds", type=float, default=60)
-    parser.add_argument("--latency-strikes", type=lambda text: tuple(map(int, text.split("x"))), default=(40, 100),
-                        help="STREAMSxSTRIKES: so many streams, and strikes in each")
     options = parser.parse_args()
     print(f"load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for part in options.parts:
