@@ -77,17 +77,17 @@ def show_loudness(options):
 def fit_lines(answer):
     yield (f"E {answer['young_pa'] / 1e9:.2f} GPa, nu {answer['poisson_ratio']:.4f}; {answer['matched']} frequencies "
            f"within {100 * answer['rms']:.3f} % r.m.s.\n")
-    yield from materials.head("recorded, Hz", "fitted, Hz", "difference, %")
+    yield from bench.head("recorded, Hz", "fitted, Hz", "difference, %")
     for line in answer["lines"]:
         if "mode" in line:
             ring, mode = line["frequency_hz"], line["model_hz"]
-            yield materials.row(f"{ring:.1f}", f"{mode:.1f}", f"{100 * (mode / ring - 1):+.3f}")
+            yield bench.row(f"{ring:.1f}", f"{mode:.1f}", f"{100 * (mode / ring - 1):+.3f}")
 
 
 def result_line(result, recorded):
     factor = bar.decay_factor(recorded, result.decays)
     decays = [f"{result.decays[hz]:.3g}" if hz in result.decays else "-" for hz in bar.HIGH_HZ]
-    return materials.row(result.name, f"{result.mrstft:.2f}", f"{result.octaves_db:.1f}",
+    return bench.row(result.name, f"{result.mrstft:.2f}", f"{result.octaves_db:.1f}",
                          "-" if factor is None else f"{factor:.2f}", *decays,
                          "x".join(f"{1000 * x:.1f}" for x in result.point_m[:2]), microphone_words(result.microphone))
 
@@ -128,8 +128,8 @@ def show_bar(options):
 def drop_line(when, drop):
     summary = drop.summary
     if drop.silent():
-        return materials.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 3))
-    return materials.row(drop.name, when, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
+        return bench.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 3))
+    return bench.row(drop.name, when, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
                          f"{drop.meter_db():.0f}",
                          *(f"{round(float(db))}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
                          f"{summary['loudest_momentary_lufs']:.1f}" if "loudest_momentary_lufs" in summary else "-")
@@ -150,13 +150,13 @@ def show_drops(options):
                       for laws, drop in (("before", before), ("modes only", modes), ("now", after))]
             print(drop_line("before", before), drop_line("modes only", modes), drop_line("now", after), sep="\n",
                   flush=True)
-            energies.append(materials.row(body.name, f"{1000 * after.mass_kg:.0f}", f"{after.first_j():.2g}",
+            energies.append(bench.row(body.name, f"{1000 * after.mass_kg:.0f}", f"{after.first_j():.2g}",
                                           f"{after.radiated_j():.2g}",
                                           f"{100 * after.radiated_j() / after.first_j():.2g}"))
             print(f"{body.name}: acceleration noise over modes, dB: {drops.click_db(modes.sound, after.sound):+.1f}",
                   file=sys.stderr)
     print()
-    print_table([*materials.head("body", "mass, g", "energy of the corner at the first contact, J", "radiated, J",
+    print_table([*bench.head("body", "mass, g", "energy of the corner at the first contact, J", "radiated, J",
                                  "radiated, %"), *energies])
     draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
 
