@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sends impulses to a scene as fast as the daemon takes them, or at a rate, and prints the counts.
-// Usage: ingest SERVER SCENE FORM IMPULSES_A_MESSAGE SECONDS DELAY_S MESSAGES_A_SECOND
-// The scene's objects have the handles 1 to 16. Zero messages a second: as fast as possible.
+// Sends impulses to a scene as fast as the daemon takes them, and prints the counts.
+// Usage: ingest SERVER SCENE FORM IMPULSES_A_MESSAGE SECONDS DELAY_S
+// The scene's objects have the handles 1 to 16.
 // The forms "rows" and "columns" strike each object at one point, and the form "spread" sends
 // columns that strike a new point with each impulse.
 
@@ -31,7 +31,6 @@ struct Options {
   bool spread = false;
   uint32_t impulse_count = 1;
   double seconds = 1;
-  double messages_per_second = 0;
 };
 
 void AddColumns(const Options& options, carillon::v1::ContactColumns& columns) {
@@ -69,11 +68,7 @@ carillon::v1::ContactStep MakeStep(double time_s, const Options& options) {
 
 void SendAll(const Options& options, carillon::client::ContactStream& stream) {
   const carillon::Stopwatch watch;
-  for (uint64_t number = 0; watch.Seconds() < options.seconds; ++number) {
-    if (options.messages_per_second > 0) {
-      const double due_s = static_cast<double>(number) / options.messages_per_second;
-      std::this_thread::sleep_for(std::chrono::duration<double>(due_s - watch.Seconds()));
-    }
+  while (watch.Seconds() < options.seconds) {
     while (stream.WaitingStepCount() >= kMostWaiting) {
       std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
@@ -102,7 +97,7 @@ int Run(const std::string& server, const carillon::v1::ContactStreamStart& start
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 8) return 2;
+  if (argc != 7) return 2;
   carillon::v1::ContactStreamStart start;
   start.set_scene(argv[2]);
   start.set_step_s(1e-3);
@@ -112,6 +107,5 @@ int main(int argc, char** argv) {
   options.columns = options.spread || argv[3] == std::string("columns");
   options.impulse_count = static_cast<uint32_t>(std::atoi(argv[4]));
   options.seconds = std::atof(argv[5]);
-  options.messages_per_second = std::atof(argv[7]);
   return Run(argv[1], start, options);
 }

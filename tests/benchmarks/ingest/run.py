@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Impulses a second from each client into a playing scene, and the latency of steps on their way.
+"""Impulses a second from each client into a playing scene.
 
 Every impulse must be accounted for: applied in time, or applied and then merged or left out by the mixer, which counts
 both. The scheduling delay is long enough for what waits in a client, and short enough that the mixer has places for
@@ -20,7 +20,6 @@ import bench  # noqa: E402
 HERE = pathlib.Path(__file__).parent
 DELAYS_S = {"C++": 0.1, "Python": 1, "Node": 1}
 OBJECT_COUNT = 16
-LATENCY_DELAYS_S = (0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.015, 0.020, 0.030, 0.050, 0.1)
 
 
 class Clients:
@@ -44,24 +43,12 @@ class Clients:
         return counts
 
     def throughput(self, language, place, server, form, size, seconds):
-        more = (0,) if language == "C++" else ()
-        counts = self.run(language, server, form, size, seconds, DELAYS_S[language], *more)
+        counts = self.run(language, server, form, size, seconds, DELAYS_S[language])
         total = counts["accepted"] + counts["late"] + counts["dropped"] + counts["rejected"]
         assert total == size * counts["steps"], counts
         bench.print_row(language, place, form, size, f"{total / counts['seconds'] / 1000:.1f}",
                         f"{1e6 * counts['cpu_s'] / total:.2f}", f"{1e6 * counts['daemon_cpu_s'] / total:.2f}",
                         counts["late"], counts["dropped"], f"{(counts['merged'] + counts['shed']) / total:.0%}")
-
-    def latency(self, place, server, seconds):
-        """The share of steps that are later than a delay, by the daemon's own count of late impulses."""
-        print(f"\nOne step of one impulse each millisecond, {place}: share that arrives later than the delay.\n")
-        bench.print_head("delay, ms", "late")
-        for delay in LATENCY_DELAYS_S:
-            counts = self.run("C++", server, "columns", 1, seconds, delay, 1000)
-            share = counts["late"] / (counts["late"] + counts["accepted"])
-            bench.print_row(f"{1000 * delay:.0f}", f"{share:.4f}")
-            if share == 0:
-                return
 
 
 def main():
@@ -89,8 +76,6 @@ def main():
                 for form in ("rows", "columns", *(("spread",) if language == "C++" else ())):
                     for size in options.sizes:
                         clients.throughput(language, place, server, form, size, options.seconds)
-        for place, server in places.items():
-            clients.latency(place, server, options.seconds)
 
 
 if __name__ == "__main__":
