@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "server/synthesis/schedule/render_order.h"
+
 namespace carillon {
 namespace {
 
@@ -76,6 +78,24 @@ TEST(PendingEvents, OwnersShareThePlacesOfABlock) {
   EXPECT_GT(Fill(pending, 2, kBlock, SurfaceImpulse{}), 0U);
   EXPECT_EQ(Fill(pending, 1, 2 * kBlock, ForceKnot{}), 160U);
   EXPECT_EQ(Fill(pending, 1, 2 * kBlock, SurfaceImpulse{}), 48U);  // 208 are four times the free 52
+}
+
+using Fields = RenderOrder::Fields;
+
+TEST(RenderOrder, GivesBackTheLargestValueOfEachField) {
+  const Fields most{.section = RenderOrder::kMostSections - 1,
+                    .block = RenderOrder::kMostBlocks - 1,
+                    .slot = RenderOrder::kMostSlots - 1,
+                    .offset = RenderOrder::kMostGroups * kMergedFrames - 1,
+                    .merged = true,
+                    .arrival = RenderOrder::kMostArrivals - 1};
+  const Fields back = RenderOrder(most).fields();
+  EXPECT_EQ(back.section, most.section);
+  EXPECT_EQ(back.block, most.block);
+  EXPECT_EQ(back.slot, most.slot);
+  EXPECT_EQ(back.offset, most.offset);
+  EXPECT_TRUE(back.merged);
+  EXPECT_EQ(back.arrival, most.arrival);
 }
 
 }  // namespace
