@@ -188,11 +188,10 @@ absl::StatusOr<std::unique_ptr<MetricsServer>> StartMetrics(const Options& optio
 }
 
 /// Serves until a stop signal arrives, and lets the sound fade out.
-absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options,
-                   const StopGuard& guard) {
+absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptions& read_options) {
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsServer> metrics, StartMetrics(options, rooms));
   LogOutput(rooms.output);
-  guard.CompleteStart();
+  CompleteStart();
   AnnounceReady(rooms.server);
   Watchdog watchdog(rooms.output);
   const RepeatedWork repeated{.period = watchdog.period(), .work = [&] {
@@ -200,7 +199,6 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
                                 GiveMemoryBack();
                               }};
   WaitForStop([&] { Reload(read_options, options, rooms.server); }, LogInfo, repeated);
-  guard.BeginStop();
   sd_notify(0, "STOPPING=1");
   rooms.output.FadeOut();
   return absl::OkStatus();
@@ -208,7 +206,7 @@ absl::Status Serve(const MeasuredRooms& rooms, Options& options, const ReadOptio
 
 /// Makes the parts of the daemon, and serves. Each part is made after the parts that it uses and
 /// destroyed before them.
-absl::Status Run(Options options, const ReadOptions& read_options, const StopGuard& guard) {
+absl::Status Run(Options options, const ReadOptions& read_options) {
   SystemClock clock;
   ASSIGN_OR_RETURN(const DataDirectory directory, DataDirectory::Open(options.data_directory));
   ASSIGN_OR_RETURN(const std::unique_ptr<ModeDatabase> database,
@@ -240,7 +238,7 @@ absl::Status Run(Options options, const ReadOptions& read_options, const StopGua
                 .decompositions = *decompositions,
                 .database = *database,
                 .server = *server},
-               options, read_options, guard);
+               options, read_options);
 }
 
 /// Prints what a database has.
@@ -282,11 +280,10 @@ int Fail(const absl::Status& status, int exit_status) {
 
 /// Runs the daemon until it is stopped. Returns the exit status.
 int RunDaemon(const CommandLine& command, const ReadOptions& read_options) {
-  BlockSignals();
+  HandleSignals();
   ApiServer::KeepLibrary();
-  const StopGuard guard(LogInfo);
   if (const absl::Status wrong = CheckRooms(command); !wrong.ok()) return Fail(wrong, kWrongUsage);
-  const absl::Status status = Run(command.options, read_options, guard);
+  const absl::Status status = Run(command.options, read_options);
   return status.ok() ? EXIT_SUCCESS : Fail(status, EXIT_FAILURE);
 }
 

@@ -1,131 +1,110 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "server/daemon/stop_signals.h"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/eventfd.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <string>
-#include <utility>
+#include <string_view>
 
 #include "absl/strings/str_cat.h"
 
 namespace carillon {
 namespace {
 
-constexpr std::chrono::milliseconds kStopLimit(4000);
-constexpr std::chrono::milliseconds kForever(-1);
-constexpr timespec kReloadPeriod{.tv_sec = 1, .tv_nsec = 0};
+using std::chrono::milliseconds;
 
-sigset_t StopSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal_number : {SIGINT, SIGTERM, SIGQUIT}) sigaddset(&signals, signal_number);
-  return signals;
+constexpr unsigned kStopLimitS = 4;
+constexpr milliseconds kReloadPeriod(1000);
+constexpr std::string_view kStopsStart = "stopping on a signal before the start was complete\n";
+constexpr std::string_view kStopTooLong =
+    "calls still run 4 s after the signal to stop, and are cut off\n";
+
+std::atomic<bool> start_is_complete = false;
+/// The handlers write the number of each signal into this pipe as a byte.
+std::array<int, 2> pipe_of_signals{-1, -1};
+
+/// Ends the process from a handler, which may neither lock nor allocate.
+[[noreturn]] void EndNow(std::string_view line) {
+  [[maybe_unused]] const ssize_t ignored = write(STDERR_FILENO, line.data(), line.size());
+  std::_Exit(EXIT_SUCCESS);
 }
 
-sigset_t ServedSignals() {
-  sigset_t signals = StopSignals();
-  sigaddset(&signals, SIGHUP);
-  return signals;
+void PassOn(int signal_number) {
+  if (!start_is_complete && signal_number != SIGHUP) EndNow(kStopsStart);
+  const int error = errno;
+  const auto byte = static_cast<unsigned char>(signal_number);
+  // A full pipe has signals enough.
+  [[maybe_unused]] const ssize_t ignored = write(pipe_of_signals[1], &byte, 1);
+  errno = error;
 }
 
-int OpenStopSignals() {
-  const sigset_t signals = StopSignals();
-  return signalfd(-1, &signals, SFD_CLOEXEC);
+void CutOff(int /*signal_number*/) { EndNow(kStopTooLong); }
+
+void Handle(int signal_number, void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  sigaction(signal_number, &action, nullptr);
 }
 
-/// Returns the first of two descriptors that is readable, or -1 if none is within the time. The
-/// second may be -1.
-int Await(int first, int second, std::chrono::milliseconds time) {
-  std::array<pollfd, 2> awaited{{{first, POLLIN, 0}, {second, POLLIN, 0}}};
-  int count = 0;
-  do {
-    count = poll(awaited.data(), awaited.size(), static_cast<int>(time.count()));
-  } while (count < 0);
-  if (count == 0) return -1;
-  return (awaited[0].revents & POLLIN) != 0 ? first : second;
+/// Returns the next signal, or 0 if none comes within the time.
+int NextSignal(milliseconds time) {
+  pollfd awaited{.fd = pipe_of_signals[0], .events = POLLIN, .revents = 0};
+  poll(&awaited, 1, static_cast<int>(std::max(time.count(), milliseconds::rep{0})));
+  unsigned char byte = 0;
+  return read(pipe_of_signals[0], &byte, 1) == 1 ? byte : 0;
 }
 
 }  // namespace
 
-void BlockSignals() {
-  const sigset_t signals = ServedSignals();
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  // A timer may have been set by the program that has started this one.
-  for (const int signal_number : {SIGUSR1, SIGUSR2, SIGALRM, SIGPIPE}) {
+void HandleSignals() {
+  // Without descriptors the start fails soon by itself.
+  [[maybe_unused]] const int ignored = pipe2(pipe_of_signals.data(), O_CLOEXEC | O_NONBLOCK);
+  for (const int signal_number : {SIGINT, SIGTERM, SIGQUIT, SIGHUP}) Handle(signal_number, PassOn);
+  // A timer may have been set by the program that has started this one. Writing beyond a file-size
+  // limit fails like a full disk once SIGXFSZ is ignored.
+  for (const int signal_number : {SIGUSR1, SIGUSR2, SIGALRM, SIGPIPE, SIGXFSZ}) {
     signal(signal_number, SIG_IGN);
   }
-  signal(SIGXFSZ, SIG_IGN);  // writing beyond a file-size limit then fails like a full disk
 }
 
-StopGuard::StopGuard(StopLog log)
-    : log_(std::move(log)),
-      signals_(OpenStopSignals()),
-      complete_(eventfd(0, EFD_CLOEXEC)),
-      stopping_(eventfd(0, EFD_CLOEXEC)),
-      ended_(eventfd(0, EFD_CLOEXEC)) {
-  // Without descriptors the start fails soon by itself.
-  if (std::min({signals_, complete_, stopping_, ended_}) < 0) return;
-  thread_ = std::thread([this] { Run(); });
-}
-
-StopGuard::~StopGuard() {
-  CompleteStart();
-  eventfd_write(ended_, 1);
-  if (thread_.joinable()) thread_.join();
-  for (const int descriptor : {signals_, complete_, stopping_, ended_}) close(descriptor);
-}
-
-void StopGuard::CompleteStart() const { eventfd_write(complete_, 1); }
-
-void StopGuard::BeginStop() const { eventfd_write(stopping_, 1); }
-
-void StopGuard::Run() const {
-  // WaitForStop takes a signal that comes with the end of the start, which is not read here.
-  if (Await(complete_, signals_, kForever) == signals_) {
-    EndNow("stopping on a signal before the start was complete");
-  }
-  if (Await(ended_, stopping_, kForever) == ended_) return;
-  if (Await(ended_, -1, kStopLimit) == ended_) return;
-  EndNow(absl::StrCat("calls still run ", kStopLimit.count(),
-                      " ms after the signal to stop, and are cut off"));
-}
-
-void StopGuard::EndNow(const std::string& line) const {
-  try {
-    log_(line);
-  } catch (const std::exception&) {
-    // The process ends well also without the memory for a line.
-  }
-  std::_Exit(EXIT_SUCCESS);
-}
+void CompleteStart() { start_is_complete = true; }
 
 void WaitForStop(const std::function<void()>& reload, const StopLog& log,
                  const RepeatedWork& repeated) {
-  const sigset_t signals = ServedSignals();
-  const sigset_t stops = StopSignals();
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(repeated.period);
-  const timespec period{.tv_sec = seconds.count(),
-                        .tv_nsec = std::chrono::nanoseconds(repeated.period - seconds).count()};
+  using SteadyClock = std::chrono::steady_clock;
+  constexpr auto kNever = SteadyClock::time_point::max();
+  SteadyClock::time_point next_work = SteadyClock::now() + repeated.period;
+  SteadyClock::time_point next_reload = kNever;
+  SteadyClock::time_point last_reload{};
   int received = 0;
-  while (received <= 0) {
-    received = sigtimedwait(&signals, nullptr, &period);
-    if (received < 0 && errno == EAGAIN) repeated.work();
-    if (received != SIGHUP) continue;
-    reload();
-    received = sigtimedwait(&stops, nullptr, &kReloadPeriod);
+  while (received == 0 || received == SIGHUP) {
+    const auto wait = std::min(next_work, next_reload) - SteadyClock::now();
+    received = NextSignal(std::chrono::ceil<milliseconds>(wait));
+    const SteadyClock::time_point now = SteadyClock::now();
+    if (received == SIGHUP) next_reload = std::max(now, last_reload + kReloadPeriod);
+    if (now >= next_reload) {
+      reload();
+      last_reload = now;
+      next_reload = kNever;
+    }
+    if (now >= next_work) {
+      repeated.work();
+      next_work = now + repeated.period;
+    }
   }
   log(absl::StrCat("stopping on SIG", sigabbrev_np(received)));
+  Handle(SIGALRM, CutOff);
+  alarm(kStopLimitS);
 }
 
 }  // namespace carillon

@@ -13,14 +13,15 @@
 namespace carillon {
 namespace {
 
-using std::chrono::microseconds;
+using std::chrono::milliseconds;
 
-constexpr microseconds kStatusPeriod = std::chrono::seconds(5);
+constexpr milliseconds kStatusPeriod(5000);
 
-microseconds Period() {
+milliseconds Period() {
   uint64_t limit_us = 0;
   if (sd_watchdog_enabled(0, &limit_us) <= 0) return kStatusPeriod;
-  return std::min(kStatusPeriod, microseconds(limit_us / 3));
+  const std::chrono::microseconds third(limit_us / 3);
+  return std::min(kStatusPeriod, std::chrono::floor<milliseconds>(third));
 }
 
 std::string StatusOf(const OutputState& state) {

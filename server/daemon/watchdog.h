@@ -17,13 +17,13 @@ class Watchdog {
 
   /// The time from one report to the next: at most a third of systemd's limit, so that one delay
   /// does not end the daemon.
-  std::chrono::microseconds period() const { return period_; }
+  std::chrono::milliseconds period() const { return period_; }
 
   void Report();
 
  private:
   LiveOutput& output_;
-  const std::chrono::microseconds period_;
+  const std::chrono::milliseconds period_;
   uint64_t last_frame_;
 };
 

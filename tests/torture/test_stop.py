@@ -108,16 +108,16 @@ class StopTest(torture.ServedTest):
                                         "--audio-device", "null"], stderr=subprocess.PIPE, text=True)
             self.addCleanup(process.stderr.close)
             self.addCleanup(process.kill)
-            wait_until(lambda: self.blocks_sigterm(process), STOP_S)
+            wait_until(lambda: self.handles_sigterm(process), STOP_S)
             process.terminate()
             self.assertEqual(process.wait(STOP_S), 0)
             self.assertIn("before the start was complete", process.stderr.read())
 
     @staticmethod
-    def blocks_sigterm(process):
+    def handles_sigterm(process):
         status = pathlib.Path("/proc", str(process.pid), "status").read_text()
-        blocked = int(status.partition("SigBlk:")[2].split()[0], 16)
-        return bool(blocked >> (signal.SIGTERM - 1) & 1)
+        handled = int(status.partition("SigCgt:")[2].split()[0], 16)
+        return bool(handled >> (signal.SIGTERM - 1) & 1)
 
     def test_frames_missed_while_it_was_stopped_are_counted(self):
         self.serve("--audio-device", f"file:{self.folder}/sound.wav")
