@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmarks share: the programs of a build, stored arrays, and tables in Markdown."""
+"""What the benchmarks share: the programs of a build, and tables in Markdown."""
 
 import argparse
 import contextlib
@@ -9,8 +9,6 @@ import pathlib
 import subprocess
 import sys
 import tempfile
-
-import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -64,25 +62,6 @@ def decompose(build, mesh, out, *options):
     if "error" in report:
         sys.exit(f"{mesh}: {report['error']}")
     return report
-
-
-def arrays_of(header, chunks):
-    """The arrays of a stored model or transfer by name (docs/model_format.md)."""
-    from carillon.v1 import modal_model_pb2
-    types = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEMENT_TYPE_FLOAT64: "<f8",
-             modal_model_pb2.ELEMENT_TYPE_UINT32: "<u4"}
-    parts = {}
-    for chunk in chunks:
-        parts.setdefault(chunk.array, []).append(chunk.data)
-    return {array.name: numpy.frombuffer(b"".join(parts.get(number, [])), types[array.type]).reshape(tuple(array.shape))
-            for number, array in enumerate(header.arrays)}
-
-
-def read_model(path):
-    """(header, arrays) of a model's file."""
-    import scripted
-    first, *chunks = scripted.read_records(path)
-    return first.header, arrays_of(first.header, [record.chunk for record in chunks])
 
 
 def pyplot():

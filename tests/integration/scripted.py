@@ -2,12 +2,14 @@
 """A shell script in the place of carillon-precompute, and what it leaves behind."""
 
 import contextlib
+import itertools
 import pathlib
 import sqlite3
 import subprocess
 
 import meshes
-from carillon.v1 import decomposition_pb2, modal_model_pb2
+import numpy
+from carillon.v1 import decomposition_pb2, modal_model_pb2, transfer_pb2
 from daemon import BIN
 from google.protobuf.internal.decoder import _DecodeVarint32
 from google.protobuf.internal.encoder import _VarintBytes
@@ -24,6 +26,15 @@ done
 nodes=$(sed -n 's/^ *target_node_count: //p' "$request")
 max_frequency_hz=$(sed -n 's/^ *max_frequency_hz: //p' "$request")
 {body}
+"""
+# A transfer waits for the file `enough`, and fails if there is a file `fail`. The file `runs` has a line for each.
+TRANSFERS_WAIT = f"""
+if grep -q radiate_stored_model "$request"; then
+  echo transfer >>"$here/runs"
+  while [ ! -e "$here/enough" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
+  [ ! -e "$here/fail" ] || exit 1
+fi
+exec {BIN}/carillon-precompute "$@"
 """
 
 
@@ -54,6 +65,31 @@ def read_records(path):
         records.append(modal_model_pb2.ModalModelRecord.FromString(data[at:at + size]))
         at += size
     return records
+
+
+def arrays_of(header, chunks):
+    """The arrays of a stored model or transfer by name (docs/model_format.md)."""
+    types = {modal_model_pb2.ELEMENT_TYPE_FLOAT32: "<f4", modal_model_pb2.ELEMENT_TYPE_FLOAT64: "<f8",
+             modal_model_pb2.ELEMENT_TYPE_UINT32: "<u4"}
+    parts = {}
+    for chunk in chunks:
+        parts.setdefault(chunk.array, []).append(chunk.data)
+    return {array.name: numpy.frombuffer(b"".join(parts.get(number, [])), types[array.type]).reshape(tuple(array.shape))
+            for number, array in enumerate(header.arrays)}
+
+
+def read_model(path):
+    """(header, arrays) of a model's file."""
+    first, *records = read_records(path)
+    return first.header, arrays_of(first.header, [record.chunk for record in records if record.HasField("chunk")])
+
+
+def read_transfer(path):
+    """(header, arrays) of the first transfer in a file that `carillon model export` has written."""
+    records = [transfer_pb2.TransferRecord.FromString(record.transfer) for record in read_records(path)
+               if record.transfer]
+    chunks = itertools.takewhile(lambda record: record.HasField("chunk"), records[1:])
+    return records[0].header, arrays_of(records[0].header, [record.chunk for record in chunks])
 
 
 def delimited(record):

@@ -10,22 +10,14 @@ import carillon
 import meshes
 import scripted
 import sound
-from carillon.v1 import decomposition_pb2, decomposition_service_pb2, radiation_pb2, scene_service_pb2, transfer_pb2
-from daemon import BIN, Daemon, ScratchTest, wait_until
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2, radiation_pb2, scene_service_pb2
+from daemon import Daemon, ScratchTest, wait_until
 
 AIR_DENSITY, SOUND_SPEED = 1.204, 343
 # The paper's coupling becomes a pressure by rho omega / (4 pi r) at 1 kHz and 1 m.
 PASCALS_PER_COUPLING = AIR_DENSITY * 2000 * math.pi / (4 * math.pi)
 # A gain that keeps quiet modes far above the end of a rendering, and the bar below the limiter.
 LOUD = 20
-# The transfer waits until it may be computed.
-WORKER = """
-if grep -q radiate_stored_model "$request"; then
-  echo transfer >>"$here/runs"
-  while [ ! -e "$here/enough" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
-fi
-exec BIN/carillon-precompute "$@"
-""".replace("BIN", str(BIN))
 
 
 def real_harmonic(order, m, direction):
@@ -40,7 +32,7 @@ def real_harmonic(order, m, direction):
 def relative_pressure(arrays, mode, kr, direction):
     """|sum of c_lm h_l Y_lm|, relative to the same power radiated equally in all directions."""
     kept = range(arrays["first"][mode], arrays["first"][mode + 1])
-    pairs = arrays["coefficients"].reshape(-1, 2)
+    pairs = arrays["coefficients"]
     total, squares = 0, 0
     for i in kept:
         order = math.isqrt(int(arrays["harmonics"][i]))
@@ -54,7 +46,7 @@ def relative_pressure(arrays, mode, kr, direction):
 class TransferTest(ScratchTest):
     def setUp(self):
         super().setUp()
-        self.serve("--transfers", "--precompute", scripted.worker(self.folder, WORKER))
+        self.serve("--transfers", "--precompute", scripted.worker(self.folder, scripted.TRANSFERS_WAIT))
 
     def transfer_job(self):
         """The job that computes a transfer, as it stands now."""
@@ -96,20 +88,9 @@ class TransferTest(ScratchTest):
         """The numbers of the model and of its transfer by name, out of an exported file, and the transfer's centre."""
         file = self.folder / "exported.model"
         self.daemon.command("model", "export", model, "--out", file)
-        types = {1: numpy.float32, 2: numpy.float64, 3: numpy.uint32}
-        described, data = [], {}
-        for record in scripted.read_records(file):
-            if record.HasField("transfer"):
-                record = transfer_pb2.TransferRecord.FromString(record.transfer)
-            if record.HasField("header"):
-                described = record.header.arrays
-                if isinstance(record, transfer_pb2.TransferRecord):
-                    center = record.header.center_m
-                    data["center_m"] = [numpy.array([center.x, center.y, center.z])]
-            else:
-                array = described[record.chunk.array]
-                data.setdefault(array.name, []).append(numpy.frombuffer(record.chunk.data, types[array.type]))
-        return {name: numpy.concatenate(pieces) for name, pieces in data.items()}
+        header, arrays = scripted.read_transfer(file)
+        center = header.center_m
+        return {**scripted.read_model(file)[1], **arrays, "center_m": numpy.array([center.x, center.y, center.z])}
 
     def test_levels_and_decays_change_as_the_transfer_says_through_a_kill(self):
         model = self.client.model(max_frequency_hz=8000)

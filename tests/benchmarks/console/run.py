@@ -7,7 +7,6 @@ The daemon has the null device, so that the page plays. measure.js drives the br
 """
 
 import contextlib
-import json
 import os
 import pathlib
 import subprocess

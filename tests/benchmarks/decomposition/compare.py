@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Carillon beside SLEPc and Spectra on the same matrices: every mode from 20 Hz to 20 kHz."""
+"""Carillon beside SLEPc on the same matrices: every mode from 20 Hz to 20 kHz."""
 
 import dataclasses
 import json
@@ -15,9 +15,12 @@ import solutions
 
 LOW_HZ, HIGH_HZ = 20.0, 20000.0
 MAX_RESIDUAL = 1e-6
-# Below all eigenvalues and a tenth of the highest frequency away: what suits Carillon suits the others.
+# Below all eigenvalues and a tenth of the highest frequency away: what suits Carillon suits SLEPc.
 SHIFT = -(2 * math.pi * HIGH_HZ / 10)**2
-HERE = pathlib.Path(__file__).parent
+# In SLEPc's own measure, the loosest power of ten with which its modes of all bodies have residuals of at most
+# MAX_RESIDUAL.
+TOLERANCE = 1e-6
+SLEPC = "SLEPc Krylov-Schur, MUMPS"
 
 # Young's modulus in Pa, Poisson's ratio, density in kg/m^3: from Lame's constants in the paper's Table 1.
 ALUMINIUM = (6.835179e10, .329801, 2700.)
@@ -45,27 +48,6 @@ BODIES = [
     Body("bunny-quadratic", lambda: bodies.bunny(.15, .15 / 28), "quadratic", "consistent", CERAMIC,
          4000),
 ]
-
-
-@dataclasses.dataclass
-class Peer:
-    """Another program. Its tolerance, in its own measure, is the loosest power of ten with which its modes of
-    all bodies have residuals of at most MAX_RESIDUAL."""
-    name: str
-    label: str
-    command: list
-    tolerance: float
-    slow_on: tuple = ()
-
-
-BUNNIES = ("hollow-bunny", "solid-bunny", "bunny-quadratic")
-
-
-def peers(build):
-    return [
-        Peer("slepc", "SLEPc Krylov-Schur, MUMPS", ["/usr/bin/python3", str(HERE / "slepc_peer.py")], 1e-6),
-        Peer("spectra", "Spectra, Eigen's SimplicialLDLT", [str(build / "tests/spectra_peer")], 1e-6, BUNNIES),
-    ]
 
 
 def run(command, environment, runs=1):
@@ -114,20 +96,16 @@ def compare_on(body, folder, options, environment):
             ours = {**times, "frequencies_hz": checked.frequencies_hz}
         row(body, f"**Carillon**, {threads} thread{'s' * (threads > 1)}, {K.shape[0]} unknowns", times,
             checked, ours)
-    for peer in peers(options.build):
-        skipped = options.peers and peer.name not in options.peers
-        if skipped or (body.name in peer.slow_on and not options.full and not options.peers):
-            continue
-        times = run([*peer.command, folder, len(ours["frequencies_hz"]) + 6, SHIFT, peer.tolerance],
-                    environment, body.runs)
-        if times is None:
-            bench.print_row(body.name, peer.label, "failed")
-            continue
-        checked = solutions.check(folder, K, M, LOW_HZ, HIGH_HZ)
-        if len(checked.frequencies_hz) != len(ours["frequencies_hz"]):
-            bench.print_row(body.name, peer.label, f"{len(checked.frequencies_hz)} modes")
-            continue
-        row(body, peer.label, times, checked, ours)
+    times = run(["/usr/bin/python3", pathlib.Path(__file__).with_name("slepc_peer.py"), folder,
+                 len(ours["frequencies_hz"]) + 6, SHIFT, TOLERANCE], environment, body.runs)
+    if times is None:
+        bench.print_row(body.name, SLEPC, "failed")
+        return
+    checked = solutions.check(folder, K, M, LOW_HZ, HIGH_HZ)
+    if len(checked.frequencies_hz) != len(ours["frequencies_hz"]):
+        bench.print_row(body.name, SLEPC, f"{len(checked.frequencies_hz)} modes")
+        return
+    row(body, SLEPC, times, checked, ours)
 
 
 def compare(options, folder, environment):

@@ -124,7 +124,8 @@ class Solver:
                                   self.options, self.environment, MOST_SECONDS, out)
         if run.verdict != "model":
             sys.exit(f"{self.body.name}, {name}: {run.report['error']['message']}")
-        return run.report, bench.read_model(out)[1], run.cpu_seconds
+        import scripted  # needs the paths of `use`
+        return run.report, scripted.read_model(out)[1], run.cpu_seconds
 
     def finer(self, nodes):
         """A mesh of four times the nodes. Its band is stated, so that it has all modes whatever they cost."""

@@ -3,15 +3,14 @@
 """Carillon's decomposition beside the programs that others use, on the same input, in turn.
 
 Each part prints a Markdown table:
-  compare   SLEPc and Spectra on the same matrices: CPU seconds, residuals
+  compare   SLEPc on the same matrices: CPU seconds, residuals
   calculix  CalculiX on the same meshes: frequencies
   estimates stated and true errors of every mode of nineteen bodies, with the defaults and for accuracies of 3 % and
             1 %
   bodies    bodies as users have them, with the defaults: verdict, cost, stated errors; with --full meshes of growing
             size, up to a million nodes
 
-Slow programs on large bodies run with --full only, or where --peers names them. CPU seconds are those of one thread
-for everybody.
+CPU seconds are those of one thread for everybody.
 """
 
 import os
@@ -46,11 +45,10 @@ HOURS = ("estimates", "bodies")  # take from half an hour to two hours
 
 def main():
     parser = bench.parser(__doc__)
-    parser.add_argument("--full", action="store_true", help="slow programs and large bodies, too")
+    parser.add_argument("--full", action="store_true", help="large bodies, too")
     parser.add_argument("--parts", type=bench.names, default=[part for part in PARTS if part not in HOURS],
                         help=f"some of {','.join(PARTS)}; all but {','.join(HOURS)} unless named")
     parser.add_argument("--only", type=bench.names, default=[], help="bodies, by name")
-    parser.add_argument("--peers", type=bench.names, default=[], help="other programs, by name")
     options = parser.parse_args()
     for part in options.parts:
         print(f"\n## {part}\n", flush=True)

@@ -79,7 +79,9 @@ class Studio:
                               "20:20000")
 
     def truth(self, body, material, nu):
-        header, arrays = bench.read_model(self.known(body, material, nu))
+        import scripted
+
+        header, arrays = scripted.read_model(self.known(body, material, nu))
         return struck.Truth(body, material, nu, arrays["eigenvalues"], arrays["couplings"],
                             arrays["shapes"].astype(float), numpy.array(header.estimated_errors))
 

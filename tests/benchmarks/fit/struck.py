@@ -44,18 +44,10 @@ def cup(radius=0.04, height=0.09, wall=0.003, steps=12):
     return bodies.lathe([(0, 0), (radius / 2, 0), *outside, *inside, (inner / 2, wall), (0, wall)], AROUND)
 
 
-def bowl(radius=0.06, wall=0.004, steps=14):
-    def arc(r, angles):
-        return [(r * math.sin(a), radius - r * math.cos(a)) for a in angles]
-
-    angles = [math.pi / 2 * k / steps for k in range(1, steps + 1)]
-    return bodies.lathe([(0, 0), *arc(radius, angles), *arc(radius - wall, angles[::-1]), (0, wall)], AROUND)
-
-
 BODIES = {
     "bar": (box(0.12, 0.026, 0.005), ("steel", "ABS")),
     "plate": (box(0.14, 0.10, 0.004), ("aluminium", "glass")),
-    "bowl": (bowl(), ("glass", "bronze")),
+    "bowl": (bodies.bowl(0.06, 0.004, AROUND, 14), ("glass", "bronze")),
     "cup": (cup(), ("bronze", "steel")),
     "bracket": (extruded([(0, 0), (0.09, 0), (0.09, 0.006), (0.006, 0.006), (0.006, 0.07), (0, 0.07)], 0.03),
                 ("ABS", "aluminium")),

@@ -52,14 +52,13 @@ using Arguments = std::vector<std::string>;
 /// Each prints one JSON object a line and returns the program's exit status.
 /// SECONDS of sound a measurement.
 int MeasureRinging(const Arguments& arguments);
-/// SECONDS of sound a measurement, MODES; without, several numbers of modes.
+/// SECONDS of sound a measurement.
 int MeasureStruck(const Arguments& arguments);
 /// SECONDS of sound a measurement.
 int MeasureDirected(const Arguments& arguments);
-/// SECONDS, IMPULSES_PER_SECOND; without that, three rates.
+/// SECONDS of each rate.
 int MeasureFlood(const Arguments& arguments);
-/// Prints the population, one "frequency_hz t60_s amplitude" a line, for other programs. COUNT
-/// SEED.
+/// Prints the modes of a bank, one "frequency_hz t60_s amplitude" a line, for other programs.
 int PrintPopulation(const Arguments& arguments);
 
 }  // namespace carillon

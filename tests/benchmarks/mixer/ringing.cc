@@ -60,16 +60,13 @@ class Stage {
   std::vector<float> block_ = std::vector<float>(kBlock);
 };
 
-void Report(const char* name, const Stage& stage, const std::vector<double>& block_s) {
+void Report(const Stage& stage, const std::vector<double>& block_s) {
   double sum = 0;
   for (const double s : block_s) sum += s;
   const double load = sum / static_cast<double>(block_s.size()) / kBlockS;
   const auto modes = static_cast<double>(stage.active_mode_count());
-  std::printf(
-      "{\"what\": \"%s\", \"target\": \"%s\", \"modes\": %.0f, \"load\": %.4f, "
-      "\"modes_per_core\": %.0f, \"median_block_ms\": %.4f, \"p99_block_ms\": %.4f}\n",
-      name, std::string(SimdTarget()).c_str(), modes, load, modes / load,
-      1e3 * Quantile(block_s, 0.5), 1e3 * Quantile(block_s, 0.99));
+  std::printf("{\"modes\": %.0f, \"load\": %.4f, \"modes_per_core\": %.0f}\n", modes, load,
+              modes / load);
   std::fflush(stdout);
 }
 
@@ -97,11 +94,11 @@ void MeasureRinging(size_t mode_count, double seconds) {
     }
     block_s.push_back(stage.Render());
   }
-  Report("ringing", stage, block_s);
+  Report(stage, block_s);
 }
 
 /// Strikes every bank in every block, between two samples.
-void MeasureStruck(const char* name, size_t mode_count, double seconds, Pulse pulse) {
+void MeasureStruck(size_t mode_count, double seconds, Pulse pulse) {
   Stage stage(mode_count);
   seconds = LengthS(mode_count, seconds);
   std::vector<double> block_s;
@@ -113,7 +110,7 @@ void MeasureStruck(const char* name, size_t mode_count, double seconds, Pulse pu
     const double s = stage.Render();
     if (block >= warm_up) block_s.push_back(s);
   }
-  Report(name, stage, block_s);
+  Report(stage, block_s);
 }
 
 }  // namespace
@@ -126,22 +123,17 @@ int MeasureRinging(const Arguments& arguments) {
 
 int MeasureStruck(const Arguments& arguments) {
   const double seconds = arguments.empty() ? 3 : std::atof(arguments[0].c_str());
-  std::vector<size_t> counts = {800, 8'000, 80'000};
-  if (arguments.size() > 1) counts = {std::stoul(arguments[1])};
-  for (const size_t modes : counts) {
-    MeasureStruck("struck", modes, seconds, {});
-    MeasureStruck("struck for 0.1 ms", modes, seconds, Pulse::RaisedCosine(1e-4F));
-    MeasureStruck("struck for 0.4 ms", modes, seconds, Pulse::RaisedCosine(4e-4F));
-    MeasureStruck("struck for 0.1 ms, Gaussian", modes, seconds, Pulse::Gaussian(1e-4F));
+  for (const size_t modes : {800U, 8'000U, 80'000U}) {
+    MeasureStruck(modes, seconds, {});
+    MeasureStruck(modes, seconds, Pulse::RaisedCosine(1e-4F));
+    MeasureStruck(modes, seconds, Pulse::RaisedCosine(4e-4F));
+    MeasureStruck(modes, seconds, Pulse::Gaussian(1e-4F));
   }
   return EXIT_SUCCESS;
 }
 
-int PrintPopulation(const Arguments& arguments) {
-  const auto count =
-      static_cast<uint32_t>(arguments.empty() ? kModesABank : std::stoul(arguments[0]));
-  const uint64_t seed = arguments.size() < 2 ? 1 : std::stoull(arguments[1]);
-  for (const SoundingMode& mode : DrawModes(count, seed).modes) {
+int PrintPopulation(const Arguments&) {
+  for (const SoundingMode& mode : DrawModes(kModesABank, 1).modes) {
     std::printf("%.17g %.17g %.17g\n", mode.natural_frequency_hz,
                 -std::log(1000.0) / mode.decay_rate_per_s, mode.coupling);
   }

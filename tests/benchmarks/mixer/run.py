@@ -30,14 +30,14 @@ def carillon(build, *arguments, most_target=None):
     return [json.loads(line) for line in run.stdout.splitlines()]
 
 
-def population(build, count):
-    text = subprocess.run([build / "tests/mixer_measure", "population", str(count), "1"], check=True,
+def population(build):
+    text = subprocess.run([build / "tests/mixer_measure", "population"], check=True,
                           capture_output=True, text=True).stdout
     return [tuple(map(float, line.split())) for line in text.splitlines()]
 
 
 def has(target, build):
-    return subprocess.run([build / "tests/mixer_measure", "population", "1"], capture_output=True,
+    return subprocess.run([build / "tests/mixer_measure", "population"], capture_output=True,
                           env=dict(os.environ, CARILLON_MOST_TARGET=target)).returncode == 0
 
 
@@ -58,7 +58,7 @@ def turns(options, folder, modes):
 def ringing(options, folder):
     print("\n## Modes a core\n")
     bench.print_head("what", "modes", "load", "modes a core", "times Klank", "from ... to")
-    modes = population(options.build, 800)
+    modes = population(options.build)
     klank = supercollider_peer.throughput(folder, modes)
     bench.print_row("scsynth Klank, 800 modes", "", "", f"{klank:,.0f}", "1.00", "")
     for (target, what, count), results in turns(options, folder, modes).items():
@@ -82,14 +82,10 @@ def flood(options, _folder):
     bench.print_head("impulses/s", "taken/s", "merged/s", "shed/s", "lost", "load", "median, worst block ms",
                      "over 2.67 ms", "missed behind 8 blocks")
     for result in carillon(options.build, "flood", options.flood_seconds):
-        if result["what"] == "merging":
-            merging = result["error_db"]
-            continue
         bench.print_row(f"{result['rate']:,.0f}", f"{result['taken_per_s']:,.0f}", f"{result['merged_per_s']:,.0f}",
                         f"{result['shed_per_s']:,.0f}", result["dropped"], f"{result['load']:.1%}",
                         f"{result['median_block_ms']:.2f}, {result['worst_block_ms']:.2f}", result["late_blocks"],
                         result["missed"])
-    print(f"\nMerging all of 1,000,000 a second changes the sound by {merging:.1f} dB of its energy.")
 
 
 PARTS = {"ringing": ringing, "directed": directed, "flood": flood}

@@ -165,7 +165,8 @@ def variants(studio, path, recording, answer):
     yield Variant("the same with the acceleration noise", dataclasses.replace(own, modes_only=False), None)
     own = heard(name, young_pa, fitted, paper_coupling=False, gaussian=False, modes_only=True)
     yield Variant("and the fitted damping, without the acceleration noise", own, None)
-    transfer = microphone.read(studio.export(name))
+    import scripted  # needs the paths of `use`
+    transfer = scripted.read_transfer(studio.export(name))
     yield Variant("and a microphone near by", own, None,
                   microphone.Microphones(transfer, damping, young_pa, DENSITY_KG_PER_M3))
     print("\nNearest sums of the matched modes:",

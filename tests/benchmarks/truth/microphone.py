@@ -6,38 +6,16 @@ the field of each mode at every place outside the sphere around the body. The so
 modes, whose frequencies and decays are known, and each is given the strength and the phase of its field at the
 microphone."""
 
-import dataclasses
-import itertools
 import math
 
 import numpy
 from scipy import special
 
-import bench
 import rings
 
 DISTANCES_M = (0.06, 0.1, 0.2, 1.0)
 # Half a sphere: the fields of bending and torsion are the same below the bar, but for their sign.
 POLAR_DEGREES, AROUND_DEGREES = range(0, 91, 15), range(0, 360, 30)
-
-
-@dataclasses.dataclass
-class Transfer:
-    """A transfer as it is stored, for unit density; see proto/carillon/v1/transfer.proto."""
-
-    header: object
-    arrays: dict
-
-
-def read(path):
-    """The first transfer in a file that `carillon model export` has written."""
-    import scripted
-    from carillon.v1 import transfer_pb2
-
-    records = [transfer_pb2.TransferRecord.FromString(record.transfer) for record in scripted.read_records(path)
-               if record.transfer]
-    header, chunks = records[0].header, itertools.takewhile(lambda record: record.HasField("chunk"), records[1:])
-    return Transfer(header, bench.arrays_of(header, [record.chunk for record in chunks]))
 
 
 def harmonics(index, polar, azimuth):
@@ -64,10 +42,11 @@ def places():
 
 
 class Microphones:
-    """Places around a body of one material, and the field of each mode there."""
+    """Places around a body of one material, and the field of each mode there. `transfer`: what scripted.read_transfer
+    returns."""
 
     def __init__(self, transfer, material, young_pa, density_kg_per_m3):
-        arrays, air = transfer.arrays, transfer.header
+        air, arrays = transfer
         self.places = places()
         self.computed = numpy.flatnonzero(arrays["states"] == 1)
         omega = numpy.sqrt(arrays["eigenvalues"][self.computed] * young_pa / density_kg_per_m3)

@@ -11,24 +11,16 @@ import numpy
 import carillon
 import meshes
 import scripted
-from daemon import BIN, ScratchTest, node_environment
+from daemon import ScratchTest, node_environment
 
 BAR = meshes.box(meshes.BAR_SIZE)
 STRIKE = {"point": (0.0, 0.008, 0.010), "impulse": (0, 0, -0.002), "duration": 1e-4, "seconds": 0.2}
-# A transfer waits until it may be computed, and fails if it must not succeed.
-WORKER = """
-if grep -q radiate_stored_model "$request"; then
-  while [ ! -e "$here/enough" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
-  [ ! -e "$here/fail" ] || exit 1
-fi
-exec BIN/carillon-precompute "$@"
-""".replace("BIN", str(BIN))
 
 
 class TransfersTest(ScratchTest):
     def setUp(self):
         super().setUp()
-        self.serve("--transfers", "--precompute", scripted.worker(self.folder, WORKER))
+        self.serve("--transfers", "--precompute", scripted.worker(self.folder, scripted.TRANSFERS_WAIT))
         self.c = self.enterContext(carillon.connect(self.daemon.server))
 
     def make(self, **request):
