@@ -7,6 +7,8 @@ import numpy
 
 import carillon
 import meshes
+from carillon import faces
+from carillon.v1 import contact_pb2, performance_pb2
 from daemon import DaemonTest
 
 BAR = meshes.box(meshes.BAR_SIZE)
@@ -82,8 +84,9 @@ class PerformanceTest(DaemonTest):
             impulse = 0.002 if k == 5 else 0.0004 if k > 5 else 0
             contacts = carillon.Contacts(1, [POINT], [(0, 0, -impulse)], partners=7) if impulse else None
             _, impacts = sound.step(contacts=contacts, poses=carillon.Poses([1], [(0, 0, 0)]))
-            told += [(k, *impulse) for impulse in impacts.impulses]
+            told += [(k, *impulse, *impacts.times) for impulse in impacts.impulses]
         self.assertEqual(len(told), 1)
+        self.assertAlmostEqual(told[0][4], 6 * STEP_S, delta=1e-3)  # it sounds a step after its report
         self.assertAlmostEqual(told[0][3], -0.002, delta=2e-4)
 
     def test_microphones_of_all_kinds_at_once(self):
@@ -180,6 +183,71 @@ class PerformanceTest(DaemonTest):
                             poses=carillon.Poses([1], [(numpy.inf, 0, 0)], environments=[1]))
             numpy.testing.assert_array_equal(refused.exception.performed[0], wanted)
             self.assertEqual(bool(wanted[[0, 2]].any()), step > 0)
+
+    def test_what_is_wrong_in_one_environment_is_rejected_there_and_costs_the_others_nothing(self):
+        def impacts(environments, **more):
+            count = len(environments)
+            return carillon.Impacts([1] * count, [POINT] * count, [IMPULSE] * count, durations=DURATION_S,
+                                    environments=environments, **more)
+
+        def rejected(reason, environment, act):
+            """The performed step of an act that must be rejected so."""
+            with self.assert_refused(reason) as refused:
+                act()
+            self.assertEqual(refused.exception.metadata.get("environment"), environment)
+            return refused.exception.performed[0]
+
+        clean, spoilt = self.begin(environments=3), self.begin(environments=3)
+
+        def both(reason, environment, spoil, **more):
+            """Two steps, of which `spoil` makes one wrong, sound alike where nothing is wrong."""
+            wanted, _ = clean.step(impacts=impacts([0, 2]))
+            samples = rejected(reason, environment, lambda: spoil(impacts=impacts([0, 2]), **more))
+            numpy.testing.assert_array_equal(samples, wanted)
+            numpy.testing.assert_array_equal(spoilt.step()[0], clean.step()[0])
+            return wanted
+
+        def with_striker(**content):
+            return spoilt.step(contacts=carillon.Contacts(1, [POINT], [IMPULSE], environments=[1],
+                                                          striker="marshmallow"), **content)
+
+        def removing(**content):
+            spoilt.remove(9, environments=[1])
+            return spoilt.step(**content)
+
+        def adding(**content):
+            spoilt.add(self.model, environments=[1], handle=1)
+            return spoilt.step(**content)
+
+        def adding_unknown(**content):
+            spoilt.add("modalModels/" + "0" * 64, environments=[1], handle=5)
+            return spoilt.step(**content)
+
+        def moving(**content):
+            spoilt.move_microphone(7, ABOVE, environments=[1])
+            return spoilt.step(**content)
+
+        def strayed(**content):  # which the client does not send
+            spoilt._next.removed_objects.add(object=1, environments=[77])
+            return spoilt.step(**content)
+
+        for reason, environment, spoil in (
+                ("UNKNOWN_STRIKER", "1", with_striker), ("OBJECT_NOT_FOUND", "1", removing),
+                ("OBJECT_EXISTS", "1", adding), ("MODAL_MODEL_NOT_FOUND", "1", adding_unknown),
+                ("PERFORMANCE_MALFORMED", "1", moving), ("PERFORMANCE_MALFORMED", None, strayed)):
+            with self.subTest(spoil.__name__):
+                both(reason, environment, spoil)
+        self.assertTrue(both("UNKNOWN_STRIKER", "1", with_striker)[[0, 2]].any())
+        # The newest rejection is told, not that of the last environment that had one.
+        rejected("OBJECT_NOT_FOUND", "2", lambda: (spoilt.remove(9, [2]), spoilt.step()))
+        rejected("OBJECT_EXISTS", "0", lambda: (spoilt.add(self.model, handle=1, environments=[0]), spoilt.step()))
+        # Columns that do not fit together, which the client does not send, are rejected as a list.
+        step = performance_pb2.PerformStep()
+        step.contacts.add(columns=contact_pb2.ContactColumns(object=[1, 1], point_m=[0] * 5), environment=[0, 2])
+        answer = faces.finished(spoilt._ask(performance_pb2.PerformRequest(step=step))).samples
+        self.assertEqual((answer.last_rejection.reason, answer.last_rejection.metadata["environment"]),
+                         ("CONTACT_MALFORMED", "2"))
+        self.assertEqual(answer.rejected_count, spoilt._rejected_count + 2)
 
     def test_environments_are_reset_by_a_mask(self):
         sound = self.begin(environments=3)

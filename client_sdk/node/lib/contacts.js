@@ -362,5 +362,5 @@ function objectsOf(content) {
   return rows.flatMap((row) => [row?.objects, row?.secondObjects, row?.object, row?.second?.object].flat());
 }
 
-module.exports = { checkedScale, contactColumns, countRows, given, makeStep, objectsOf, poseColumns, present, refuseTime, strikeOf,
-  toHandle, toPose };
+module.exports = { checkedScale, contactColumns, countRows, given, makeStep, numbers, objectsOf, poseColumns, present,
+  refuseTime, strikeOf, toHandle, toPose };

@@ -3,7 +3,7 @@
 
 const util = require('util');
 const { counted, refuse, refuseNoMessage, refuseNoNumbers, refuseUnknown } = require('./checks');
-const { checkedScale, contactColumns, given, poseColumns, present, toHandle, toPose } = require('./contacts');
+const { checkedScale, contactColumns, given, numbers, poseColumns, present, toHandle, toPose } = require('./contacts');
 const { message } = require('./contract');
 const { CarillonError, fromCall, fromInfo } = require('./errors');
 const { named, toRadiation } = require('./materials');
@@ -13,16 +13,8 @@ const { warnOfContacts } = require('./warnings');
 
 // The trailing metadata in which the daemon tells of warnings.
 const SUMMARY_KEY = 'carillon-summary-bin';
+const ENVIRONMENT = 'the index of an environment, a whole number from 0';
 const KINDS = ['omni', 'stereo', 'ears', 'ambisonic'];
-
-/** The indices of environments for a message, where none means all. */
-function indices(environments) {
-  if (environments === undefined || environments === null) return [];
-  const list = typeof environments === 'number' ? [environments] : Array.from(environments);
-  if (list.some((index) => !Number.isInteger(index))) throw new TypeError('environments must be indices, and no mask');
-  if (!list.length) throw new RangeError('environments is empty; leave it out to mean all of them');
-  return list;
-}
 
 function toMicrophone(microphone) {
   refuseUnknown(microphone, ['kind', 'order', 'pose', 'on'], 'a microphone');
@@ -30,11 +22,6 @@ function toMicrophone(microphone) {
   if (!KINDS.includes(kind)) refuse(kind, 'kind of a microphone', KINDS.map((name) => `'${name}'`).join(', '));
   return { kind: `MICROPHONE_KIND_${kind.toUpperCase()}`, ...present({ ambisonicOrder: order, object: toHandle(on) }),
     ...given('pose', toPose(pose)) };
-}
-
-/** Columns with the environment of each row; `read` makes the other columns. */
-function withEnvironments({ environments, ...columns }, read) {
-  return { columns: read(columns), ...environments === undefined ? {} : { environment: Array.from(environments) } };
 }
 
 /**
@@ -71,6 +58,30 @@ class Performance {
     return this;
   }
 
+  /** Returns an index of an environment. Throws TypeError or CarillonError if it is none. */
+  environmentOf(index, name) {
+    if (!Number.isInteger(index)) refuse(index, name, ENVIRONMENT);
+    if (index >= 0 && index < this.environmentCount) return index;
+    throw new CarillonError('PERFORMANCE_MALFORMED',
+      `environment ${index} is unknown; the performance has ${this.environmentCount}, counted from 0`);
+  }
+
+  /** The indices of environments for a message, where none means all. */
+  indices(environments) {
+    if (environments === undefined || environments === null) return [];
+    const list = typeof environments === 'number' ? [environments] : Array.from(environments);
+    if (!list.length) throw new RangeError('environments is empty; leave it out to mean all of them');
+    return list.map((index) => this.environmentOf(index, 'an entry of environments'));
+  }
+
+  /** Columns with the environment of each row, or one for all; `read` makes the other columns. */
+  withEnvironments({ environments, ...rest }, read) {
+    const columns = read(rest);
+    if (environments === undefined || environments === null) return { columns };
+    return { columns, environment: numbers(environments, columns.object.length, 'environments',
+      (index, name) => this.environmentOf(index, name)) };
+  }
+
   /** Sends a request, and returns the first message of its answer. */
   ask(request) {
     this.call.write(request);
@@ -99,14 +110,16 @@ class Performance {
     this.next.addedObjects = [...this.next.addedObjects ?? [], {
       object: { handle: this.handle, ...named(model, material), size, gain, ...given('pose', toPose(pose)),
         ...present({ radiation: toRadiation(radiation) }) },
-      environments: indices(environments) }];
+      environments: this.indices(environments) }];
     return this.handle;
   }
 
-  /** Removes an object from the environments, by default from all, at the next step. Its sound fades out within 10 ms. */
+  /**
+   * Removes an object from the environments, by default from all, at the next step. Its sound fades out within 10 ms.
+   */
   remove(object, environments) {
     this.next.removedObjects = [...this.next.removedObjects ?? [],
-      { object: toHandle(object), environments: indices(environments) }];
+      { object: toHandle(object), environments: this.indices(environments) }];
   }
 
   /**
@@ -114,33 +127,27 @@ class Performance {
    * objects and microphones are where they were added.
    */
   reset(environments) {
-    const listed = indices(environments);
-    const unknown = listed.find((index) => !(index >= 0 && index < this.environmentCount));
-    if (unknown !== undefined) {
-      throw new CarillonError('PERFORMANCE_MALFORMED',
-        `environment ${unknown} is unknown; the performance has ${this.environmentCount}, counted from 0`);
-    }
-    this.call.write({ reset: { environments: listed } });
+    this.call.write({ reset: { environments: this.indices(environments) } });
   }
 
   /**
    * Performs a step of all environments, with contacts, impacts, forces and poses as columns at its end; their
-   * `environments` have the index of each row, by default 0. The sound lasts the step over `timeScale`, by default 1,
-   * and the step in a pause, at 0. Returns the samples of the step, a Float32Array with
-   * element [environment][channel][frame], `frameCount`, and the impacts if the performance tells them, as the columns
-   * of PerformedImpacts. Throws CarillonError if a contact is rejected; the step was performed without it, and the
-   * error has what it gave as `performed`.
+   * `environments` have the index of each row, or one for all, by default 0. The sound lasts the step over `timeScale`,
+   * by default 1, and the step in a pause, at 0. Returns the samples of the step, a Float32Array with element
+   * [environment][channel][frame], `frameCount`, and the impacts if the performance tells them, as the columns of
+   * PerformedImpacts. Throws CarillonError if a contact is rejected, or an object to be added or removed; the step
+   * was performed without it, and the error has what it gave as `performed`.
    */
   async step(content = {}) {
     refuseUnknown(content, ['contacts', 'impacts', 'forces', 'poses', 'timeScale'], 'step');
     const step = { ...this.next, ...given('timeScale', checkedScale(content.timeScale)) };
-    this.next = {};
     for (const name of ['contacts', 'impacts', 'forces']) {
       if (!content[name]) continue;
       step.contacts = [...step.contacts ?? [],
-        withEnvironments(content[name], (columns) => contactColumns(columns, name, this.settings.frame))];
+        this.withEnvironments(content[name], (columns) => contactColumns(columns, name, this.settings.frame))];
     }
-    if (content.poses) step.poses = withEnvironments(content.poses, poseColumns);
+    if (content.poses) step.poses = this.withEnvironments(content.poses, poseColumns);
+    this.next = {};
     let { samples: answer } = await this.ask({ step });
     const pieces = [answer.samples];
     while (!answer.isLast) {

@@ -54,24 +54,26 @@ std::span<const uint32_t> SpanOf(const google::protobuf::RepeatedField<uint32_t>
   return {column.data(), static_cast<size_t>(column.size())};
 }
 
-absl::Status Validate(const v1::MicrophonePoses& poses, size_t microphone_count) {
+absl::Status Validate(const v1::MicrophonePoses& poses) {
   const int count = poses.microphone_size();
   const bool rotated = poses.orientation_size() > 0;
-  if (poses.position_m_size() != 3 * count || (rotated && poses.orientation_size() != 4 * count)) {
-    return Invalid(
-        "CONTACT_MALFORMED",
-        absl::StrCat("microphone_poses has ", count, " microphones, ", poses.position_m_size(),
-                     " coordinates and ", poses.orientation_size(),
-                     " numbers of orientations; give 3 and 4, or no orientation, for "
-                     "each microphone"));
+  if (poses.position_m_size() == 3 * count && (!rotated || poses.orientation_size() == 4 * count)) {
+    return absl::OkStatus();
   }
-  for (const uint32_t microphone : poses.microphone()) {
-    if (microphone < microphone_count) continue;
-    return Invalid("PERFORMANCE_MALFORMED",
-                   absl::StrCat("microphone_poses has microphone ", microphone,
-                                "; the settings have ", microphone_count, ", counted from 0"));
-  }
-  return absl::OkStatus();
+  return Invalid(
+      "CONTACT_MALFORMED",
+      absl::StrCat("microphone_poses has ", count, " microphones, ", poses.position_m_size(),
+                   " coordinates and ", poses.orientation_size(),
+                   " numbers of orientations; give 3 and 4, or no orientation, for "
+                   "each microphone"));
+}
+
+/// Returns the figures of the collisions of a list. Errors: InvalidArgument (CONTACT_MALFORMED,
+/// UNKNOWN_STRIKER).
+absl::StatusOr<HertzContact> Check(const v1::ContactColumns& columns) {
+  RETURN_IF_ERROR(KindOf(columns.kind()).status());
+  RETURN_IF_ERROR(carillon::Validate(columns));
+  return ToHertzContact(columns.hertz());
 }
 
 Pose ReadPose(const v1::MicrophonePoses& poses, int row) {
@@ -86,60 +88,104 @@ Pose ReadPose(const v1::MicrophonePoses& poses, int row) {
 
 }  // namespace
 
-absl::Status RowsByEnvironment::Sort(std::span<const uint32_t> environments,
-                                     size_t environment_count) {
-  if (!environments.empty() && environments.size() != rows_.size()) {
-    return Invalid("CONTACT_MALFORMED",
-                   absl::StrCat("environment has ", environments.size(), " numbers for ",
-                                rows_.size(), " rows; give one for each row, or none"));
+void StepRejections::Tell(size_t environment, ContactIntake& intake) const {
+  const auto [begin, end] = of_environments_.equal_range(environment);
+  for (auto at = begin; at != end; ++at) intake.Reject(at->second.count, at->second.why);
+}
+
+absl::Status StepRejections::status() const {
+  if (!strays_.empty()) return strays_.front().why;
+  return of_environments_.empty() ? absl::OkStatus() : of_environments_.begin()->second.why;
+}
+
+RowsByEnvironment::RowsByEnvironment(std::span<const uint32_t> environments, int row_count,
+                                     size_t environment_count, StepRejections& rejections)
+    : first_(environment_count + 1) {
+  const auto count = static_cast<size_t>(row_count);
+  if (!environments.empty() && environments.size() != count) {
+    rejections.AddStray(
+        std::max<size_t>(count, 1),
+        Invalid("CONTACT_MALFORMED",
+                absl::StrCat("environment has ", environments.size(), " numbers for ", count,
+                             " rows; give one for each row, or none")));
+    return;
   }
   const auto environment_of = [&](size_t row) {
     return environments.empty() ? 0 : environments[row];
   };
-  for (size_t row = 0; row < rows_.size(); ++row) {
-    if (environment_of(row) >= environment_count) {
-      return Invalid("PERFORMANCE_MALFORMED",
-                     absl::StrCat("row ", row, " is of environment ", environment_of(row),
-                                  "; the performance has ", environment_count, ", counted from 0"));
+  size_t unknown_count = 0, last_unknown = 0;
+  for (size_t row = 0; row < count; ++row) {
+    if (environment_of(row) < environment_count) {
+      ++first_[environment_of(row) + 1];
+    } else {
+      ++unknown_count;
+      last_unknown = row;
     }
-    ++first_[environment_of(row) + 1];
+  }
+  if (unknown_count > 0) {
+    rejections.AddStray(unknown_count,
+                        Invalid("PERFORMANCE_MALFORMED",
+                                absl::StrCat("row ", last_unknown, " is of environment ",
+                                             environment_of(last_unknown), "; the performance has ",
+                                             environment_count, ", counted from 0")));
   }
   for (size_t i = 0; i < environment_count; ++i) first_[i + 1] += first_[i];
+  rows_.resize(first_.back());
   std::vector<size_t> next(first_.begin(), first_.end() - 1);
-  for (size_t row = 0; row < rows_.size(); ++row) {
+  for (size_t row = 0; row < count; ++row) {
+    if (environment_of(row) >= environment_count) continue;
     rows_[next[environment_of(row)]++] = static_cast<int>(row);
   }
-  return absl::OkStatus();
 }
 
-absl::StatusOr<PerformRows> PerformRows::Make(const v1::PerformStep& step, size_t environment_count,
-                                              size_t microphone_count) {
-  const auto as_given = [](int a, int b) { return a < b; };
-  RETURN_IF_ERROR(carillon::Validate(step.poses().columns()));
-  ASSIGN_OR_RETURN(
-      RowsByEnvironment poses,
-      RowsByEnvironment::Make(SpanOf(step.poses().environment()),
-                              step.poses().columns().object_size(), environment_count, as_given));
-  RETURN_IF_ERROR(Validate(step.microphone_poses(), microphone_count));
-  ASSIGN_OR_RETURN(RowsByEnvironment microphones,
-                   RowsByEnvironment::Make(SpanOf(step.microphone_poses().environment()),
-                                           step.microphone_poses().microphone_size(),
-                                           environment_count, as_given));
-  PerformRows rows(step, std::move(poses), std::move(microphones));
+void RowsByEnvironment::Reject(const absl::Status& why, StepRejections& rejections) {
+  if (rows_.empty()) rejections.AddStray(1, why);
+  for (size_t i = 0; i + 1 < first_.size(); ++i) {
+    if (const size_t count = of(i).size(); count > 0) rejections.Add(i, count, why);
+  }
+  rows_.clear();
+  std::ranges::fill(first_, 0);
+}
+
+PerformRows::PerformRows(const v1::PerformStep& step, size_t environment_count,
+                         size_t microphone_count, StepRejections& rejections)
+    : step_(step),
+      rejections_(rejections),
+      poses_(SpanOf(step.poses().environment()), step.poses().columns().object_size(),
+             environment_count, rejections),
+      microphones_(SpanOf(step.microphone_poses().environment()),
+                   step.microphone_poses().microphone_size(), environment_count, rejections) {
+  const absl::Status poses = carillon::Validate(step.poses().columns());
+  if (!poses.ok()) poses_.Reject(poses, rejections);
+  const absl::Status microphones = Validate(step.microphone_poses());
+  if (!microphones.ok()) microphones_.Reject(microphones, rejections);
+  for (size_t i = 0; i < environment_count; ++i) {
+    for (const int row : microphones_.of(i)) {
+      const uint32_t microphone = step.microphone_poses().microphone(row);
+      if (microphone < microphone_count) continue;
+      rejections.Add(
+          i, 1,
+          Invalid("PERFORMANCE_MALFORMED",
+                  absl::StrCat("microphone_poses has microphone ", microphone,
+                               "; the settings have ", microphone_count, ", counted from 0")));
+    }
+  }
   for (const v1::PerformedContacts& contacts : step.contacts()) {
     const v1::ContactColumns& columns = contacts.columns();
-    RETURN_IF_ERROR(KindOf(columns.kind()).status());
-    RETURN_IF_ERROR(carillon::Validate(columns));
-    ASSIGN_OR_RETURN(const HertzContact hertz, ToHertzContact(columns.hertz()));
-    ASSIGN_OR_RETURN(RowsByEnvironment own,
-                     RowsByEnvironment::Make(SpanOf(contacts.environment()), columns.object_size(),
-                                             environment_count, ByContent(columns)));
-    rows.contacts_.push_back({&columns, hertz, std::move(own)});
+    RowsByEnvironment own(SpanOf(contacts.environment()), columns.object_size(), environment_count,
+                          rejections);
+    const absl::StatusOr<HertzContact> hertz = Check(columns);
+    if (!hertz.ok()) {
+      own.Reject(hertz.status(), rejections);
+      continue;
+    }
+    own.Order(ByContent(columns));
+    contacts_.push_back({&columns, *hertz, std::move(own)});
   }
-  return rows;
 }
 
 void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& intake) const {
+  if (microphone == 0) rejections_.Tell(environment, intake);
   for (const int row : poses_.of(environment)) {
     const v1::PoseColumns& columns = step_.poses().columns();
     intake.Move(columns.object(row), ReadRow(columns, row),

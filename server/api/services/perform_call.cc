@@ -38,6 +38,14 @@ absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED", message);
 }
 
+/// Returns the same refusal for an environment, with the figure "environment".
+absl::Status InEnvironment(const absl::Status& status, size_t environment) {
+  v1::ErrorInfo error = ToErrorInfo(status);
+  error.set_message(absl::StrCat("environment ", environment, ", ", error.message()));
+  (*error.mutable_metadata())["environment"] = absl::StrCat(environment);
+  return FromErrorInfo(status.code(), error);
+}
+
 /// Takes the settings, then performs one step after the other. A client that thinks for an hour
 /// between two steps keeps its environments.
 class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformResponse> {
@@ -78,8 +86,9 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
     sample_rate_hz_ = settings.sample_rate_hz;
     microphone_count_ = settings.microphones.size();
     tells_impacts_ = settings.tells_impacts;
+    told_counts_.resize(count);
     for (const v1::PerformedObject& object : message.objects()) RETURN_IF_ERROR(Add(object));
-    return absl::OkStatus();
+    return rejections_.status();
   }
 
   absl::Status GrowMemory() {
@@ -91,36 +100,43 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   /// Calls `act` with each of the environments of these indices or, if there is none, with all.
+  /// Where this fails, it is rejected.
   template <typename Act>
-  absl::Status ForEach(const google::protobuf::RepeatedField<uint32_t>& indices, const Act& act) {
+  void ForEach(const google::protobuf::RepeatedField<uint32_t>& indices, const Act& act) {
+    const auto call = [&](size_t index) {
+      absl::Status done = act(performance_->environment(index));
+      if (!done.ok()) rejections_.Add(index, 1, std::move(done));
+    };
+    const size_t count = performance_->environment_count();
     for (const uint32_t index : indices) {
-      if (index >= performance_->environment_count()) {
-        return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED",
-                       absl::StrCat("environment ", index, " is unknown; the performance has ",
-                                    performance_->environment_count(), ", counted from 0"));
+      if (index < count) {
+        call(index);
+      } else {
+        rejections_.AddStray(
+            1, Malformed(absl::StrCat("environment ", index, " is unknown; the performance has ",
+                                      count, ", counted from 0")));
       }
-      RETURN_IF_ERROR(act(performance_->environment(index)));
     }
-    for (size_t i = 0; indices.empty() && i < performance_->environment_count(); ++i) {
-      RETURN_IF_ERROR(act(performance_->environment(i)));
-    }
-    return absl::OkStatus();
+    for (size_t i = 0; indices.empty() && i < count; ++i) call(i);
   }
 
+  /// Errors: those of GrowMemory. Others are rejected.
   absl::Status Add(const v1::PerformedObject& added) {
-    ASSIGN_OR_RETURN(const ObjectOfModel object,
-                     ToObject(added.object(), daemon_.database.models()));
-    RETURN_IF_ERROR(ForEach(added.environments(), [&](Environment& environment) {
-      return environment.AddObject(added.object().handle(), object.model, object.properties);
-    }));
+    const absl::StatusOr<ObjectOfModel> object =
+        ToObject(added.object(), daemon_.database.models());
+    ForEach(added.environments(), [&](Environment& environment) {
+      RETURN_IF_ERROR(object.status());
+      return environment.AddObject(added.object().handle(), object->model, object->properties);
+    });
     return GrowMemory();
   }
 
   absl::Status Reset(const v1::PerformReset& reset) {
-    return ForEach(reset.environments(), [this](Environment& environment) {
+    ForEach(reset.environments(), [this](Environment& environment) {
       NoteWarnings(environment);
       return environment.Reset();
     });
+    return absl::OkStatus();
   }
 
   /// Keeps the warnings about the contacts since the last reset. Of several with the same id the
@@ -149,21 +165,36 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
     const double time_scale = step.has_time_scale() ? step.time_scale() : 1;
     RETURN_IF_ERROR(performance_->CheckScale(time_scale));
     for (const v1::RemovedObject& removed : step.removed_objects()) {
-      RETURN_IF_ERROR(ForEach(removed.environments(), [&](Environment& environment) {
-        return environment.RemoveObject(removed.object());
-      }));
+      ForEach(removed.environments(),
+              [&](Environment& environment) { return environment.RemoveObject(removed.object()); });
     }
     for (const v1::PerformedObject& object : step.added_objects()) RETURN_IF_ERROR(Add(object));
-    ASSIGN_OR_RETURN(const PerformRows rows,
-                     PerformRows::Make(step, performance_->environment_count(), microphone_count_));
+    const PerformRows rows(step, performance_->environment_count(), microphone_count_, rejections_);
     samples_ = performance_->Step(
         [&rows](size_t environment, size_t microphone, ContactIntake& intake) {
           rows.Read(environment, microphone, intake);
         },
         time_scale);
+    NoteRejections();
     sent_count_ = 0;
     answers_ = true;
     return absl::OkStatus();
+  }
+
+  /// Counts what the step rejected, and keeps why its last rejection was.
+  void NoteRejections() {
+    for (const StepRejections::Rejection& stray : rejections_.strays()) {
+      rejected_count_ += stray.count;
+      last_rejection_ = stray.why;
+    }
+    rejections_.Clear();
+    for (size_t i = 0; i < told_counts_.size(); ++i) {
+      const Environment& environment = performance_->environment(i);
+      const uint64_t count = environment.rejected_count();
+      if (count == told_counts_[i]) continue;
+      rejected_count_ += count - std::exchange(told_counts_[i], count);
+      last_rejection_ = InEnvironment(environment.last_rejection(), i);
+    }
   }
 
   absl::StatusOr<Supply> Fill(v1::PerformResponse& response) override {
@@ -202,24 +233,15 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   void FillFindings(v1::PerformedSamples& message) {
-    uint64_t rejected_count = 0;
-    absl::Status last_rejection;
-    for (size_t i = 0; i < performance_->environment_count(); ++i) {
-      Environment& environment = performance_->environment(i);
-      const uint64_t count = environment.rejected_count();
-      rejected_count += count;
-      if (count > 0 && !environment.last_rejection().ok()) {
-        last_rejection = environment.last_rejection();
-      }
-      if (!tells_impacts_) continue;
-      for (const BlowRecord& impact : environment.TakeImpacts()) {
+    for (size_t i = 0; tells_impacts_ && i < performance_->environment_count(); ++i) {
+      for (const BlowRecord& impact : performance_->environment(i).TakeImpacts()) {
         AddImpact(static_cast<uint32_t>(i), impact, *message.mutable_impacts());
       }
     }
-    message.set_rejected_count(rejected_count);
+    message.set_rejected_count(rejected_count_);
     message.clear_last_rejection();
-    if (!last_rejection.ok())
-      *message.mutable_last_rejection() = ToLegibleErrorInfo(last_rejection);
+    if (!last_rejection_.ok())
+      *message.mutable_last_rejection() = ToLegibleErrorInfo(last_rejection_);
   }
 
   const RenderContext daemon_;
@@ -232,6 +254,10 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   bool begins_ = false;   // whether PerformanceBegun is to be sent
   bool answers_ = false;  // whether samples are to be sent
   bool ended_ = false;
+  StepRejections rejections_;          // since the last step
+  std::vector<uint64_t> told_counts_;  // rejections of each environment
+  uint64_t rejected_count_ = 0;        // of all environments, and of none
+  absl::Status last_rejection_;
   std::map<std::string, v1::Warning> warnings_;  // by id
   std::span<const float> samples_;               // that the newest step rendered
   size_t sent_count_ = 0;                        // environments whose samples were sent

@@ -253,6 +253,17 @@ test('a performance gives the samples of each step, the same again after a reset
   await assert.rejects(sound.step({ impacts: { ...blow, objects: 9 } }),
     ({ reason, performed }) => reason === 'OBJECT_NOT_FOUND' && performed.samples.length === 2 * 3 * 960);
   await assert.rejects(sound.step({ impacts: { ...blow, environments: [2] } }), { reason: 'PERFORMANCE_MALFORMED' });
+  // One index is that of all rows, and a list has one for each row: what the client refuses loses nothing.
+  const two = { ...blow, points: [POINT, POINT], impulses: [IMPULSE, IMPULSE] };
+  const gong = sound.add(model);
+  for (const environments of [[1], [0, 1, 1], [true, false], 0.5]) {
+    await assert.rejects(sound.step({ impacts: { ...two, environments } }), (error) => !error.performed);
+  }
+  const { impacts } = await sound.step({ impacts: { ...two, objects: gong, environments: 1 } });
+  assert.deepEqual(impacts.environment, [1, 1]);
+  sound.remove(9, [1]);
+  await assert.rejects(sound.step({ impacts: blow }), ({ reason, metadata, performed }) =>
+    reason === 'OBJECT_NOT_FOUND' && metadata.environment === '1' && performed.impacts.object.length === 1);
   await assert.rejects(c.perform({ step: 0.02, latency: 1 }), { reason: 'INVALID_SETTINGS' });
   const slow = await c.perform({ step: 0.02 });
   const counts = [];
@@ -263,7 +274,7 @@ test('a performance gives the samples of each step, the same again after a reset
   const far = { ...blow, objects: slow.add(model), points: [[9, 9, 9]], environments: [0] };
   await slow.step({ impacts: far });
   assert.deepEqual((await slow.close()).map(({ id, count }) => [id, count]), [['POINTS_DISTANT', 1]]);
-  assert.deepEqual(await sound.close(), []); // which an error has ended
+  assert.deepEqual(await sound.close(), []);
 });
 
 test('a trace is written and read, and a damaged one is refused', async () => {

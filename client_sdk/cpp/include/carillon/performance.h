@@ -16,7 +16,8 @@ struct PerformedStep {
   std::span<const float> samples;
   uint32_t frame_count = 0;
   /// The rest of the daemon's answer: the impacts if the settings ask for them, the number of
-  /// contacts rejected so far, and why the newest one was. It has no samples.
+  /// contacts and other parts of steps rejected so far, and why the last one was. It has no
+  /// samples.
   const v1::PerformedSamples* findings = nullptr;
 };
 
@@ -32,7 +33,7 @@ class Performance {
   /// latency in frames.
   virtual const v1::PerformanceBegun& begun() const = 0;
 
-  /// Performs a step of all environments. A rejected contact is no error: see
+  /// Performs a step of all environments. What is rejected of a step is no error: see
   /// PerformedStep::findings. After an error the performance has ended.
   virtual absl::StatusOr<PerformedStep> Step(const v1::PerformStep& step) = 0;
 

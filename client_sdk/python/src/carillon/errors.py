@@ -24,7 +24,7 @@ class CarillonError(Exception):
     where, and how to repair it; `metadata` has figures that belong to the reason; `remedies` are changes to the
     request that may help, the most promising first: each has a `field` of CreateModalModelRequest, a `value` in
     protobuf's text form (empty: the caller chooses), the command line's `option`, and its `effect` in words.
-    `performed` are the samples and impacts of the step of a performance that rejected a contact, and otherwise None."""
+    `performed` are the samples and impacts of a step of a performance of which a part was rejected, else None."""
 
     performed: Any = None
 

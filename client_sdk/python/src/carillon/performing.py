@@ -213,8 +213,8 @@ class PerformanceCalls(Block):
         `environments` have the index of each row, by default 0. The sound lasts the step over `time_scale`, by default
         1, and the step in a pause, at 0. Returns the samples of the step, a float32 array
         [environment, channel, frame] that must not be written to, and the impacts if the performance tells them. Raises
-        CarillonError if a contact is rejected; the step was performed without it, and the error has what it gave as
-        `performed`."""
+        CarillonError if a contact is rejected, or an object to be added or removed; the step was performed without it,
+        and the error has what it gave as `performed`."""
         scale = checked_scale(time_scale)
         step = performance_pb2.PerformStep(time_scale=scale)
         _fill(step, self._settings.frame, contacts, impacts, forces, poses)
@@ -266,7 +266,7 @@ class PerformanceCalls(Block):
         return indices
 
     def _check(self, index: int) -> None:
-        """Refuses an environment that is not there, by which the daemon would end the performance."""
+        """Refuses an environment that is not there."""
         if not 0 <= index < self.environment_count:
             raise errors.CarillonError("PERFORMANCE_MALFORMED", f"environment {index} is unknown; the performance has "
                                        f"{self.environment_count}, counted from 0")
