@@ -66,33 +66,3 @@ def bar_first_bending_hz():
     length, _, height = BAR_SIZE
     return (4.730041**2 / (2 * math.pi * length**2)
             * math.sqrt(YOUNG_PA * height**2 / (12 * DENSITY)))
-
-
-def bowl(radius=0.08, wall=0.004, around=48, down=12):
-    """Half a sphere that opens along +z, about its centre of mass if it were thin."""
-    middle = (0.0, 0.0, radius / 2)
-    vertices, faces = [], []
-    for r in (radius, radius - wall):
-        for ring in range(down):
-            angle = math.pi / 2 * (1 - ring / down)  # of the rim, then down to the bottom
-            vertices += [(middle[0] + r * math.sin(angle) * math.cos(2 * math.pi * i / around),
-                          middle[1] + r * math.sin(angle) * math.sin(2 * math.pi * i / around),
-                          middle[2] - r * math.cos(angle)) for i in range(around)]
-        vertices.append((0.0, 0.0, middle[2] - r))
-    inner = down * around + 1
-
-    def band(upper, lower):
-        for i in range(around):
-            j = (i + 1) % around
-            faces.extend(((upper + i, lower + i, lower + j), (upper + i, lower + j, upper + j)))
-
-    for ring in range(down - 1):
-        band(ring * around, (ring + 1) * around)
-        band(inner + (ring + 1) * around, inner + ring * around)
-    for i in range(around):
-        j = (i + 1) % around
-        last = (down - 1) * around
-        faces.append((last + i, last + around, last + j))
-        faces.append((inner + last + j, inner + last + around, inner + last + i))
-    band(inner, 0)  # the rim
-    return obj(vertices, faces)

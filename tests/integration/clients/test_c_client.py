@@ -147,7 +147,7 @@ class CClientTest(DaemonTest):
     def test_the_program_of_the_page_strikes_a_bell(self):
         page = (ROOT / "docs/ten_minutes_c.md").read_text()
         (self.folder / "strike.c").write_text(re.search(r"(?ms)^```c\n(.*?)^```", page)[1])
-        (self.folder / "bowl.obj").write_bytes(meshes.bowl())
+        self.daemon.command("example", "bowl", "--out", self.folder / "bowl.obj")
         compiles = re.search(r"(?m)^    libraries=.*\n    gcc .*\n", page)[0]
         options = {"cwd": self.folder, "text": True,
                    "env": {**os.environ, "CARILLON_SERVER": self.daemon.server, "HOME": str(self.folder)}}
@@ -262,25 +262,6 @@ class CClientTest(DaemonTest):
         # Columns have floats, and rows doubles.
         numpy.testing.assert_allclose(samples, same.samples, atol=1e-4 * same.peak)
         self.assertAlmostEqual(len(samples) / 44100, 0.5 + 1 / 60 + 0.125 / 4 + 0.5, delta=0.005)
-
-    def assert_keeps_time(self, send):
-        for time_s, is_taken in ((1.0, True), (float("nan"), False), (1.1e10, False), (0.5, False), (2.0, True)):
-            code = send(ctypes.byref(Step(time_s)))
-            if is_taken:
-                self.done(code)
-            else:
-                self.refused(code, b"^INVALID_STREAM: .*(goes back .* at step 1|step 1 is (nan|1.1e\\+10)); ")
-
-    def test_a_step_whose_time_is_too_large_or_goes_back_is_refused_at_once(self):
-        file, report = str(self.folder / "back.contacts"), Report()
-        trace = self.make(self.calls.carillon_create_trace, file.encode(), 1 / 60, 0, None)
-        self.assert_keeps_time(lambda step: self.calls.carillon_trace_step(trace, step))
-        self.done(self.calls.carillon_close_trace(trace))
-        self.assertEqual([step.time_s for step in carillon.Trace.read(file).steps], [1, 2])
-        stream = self.open_stream(self.make_scene())
-        self.assert_keeps_time(lambda step: self.calls.carillon_send(stream, step))
-        self.done(self.calls.carillon_close_stream(stream, ctypes.byref(report)))
-        self.assertEqual(report.step_count, 2)
 
     def test_a_placed_bar_is_heard_from_its_place(self):
         """The bar is 2 m to the right of the listener, who looks along -z from z = 1 m."""

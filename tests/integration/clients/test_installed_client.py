@@ -9,8 +9,6 @@ import subprocess
 
 import numpy
 
-import carillon
-import meshes
 from daemon import BUILD, ROOT, DaemonTest
 
 EXAMPLE = ROOT / "client_sdk/examples/strike"
@@ -43,7 +41,8 @@ class InstalledClientTest(DaemonTest):
         (cls.folder / "build").mkdir()
         (cls.folder / "build/release").symlink_to(BUILD)
         cls.bash(INSTALL)
-        cls.model = cls.client.model(meshes.bowl(), material=carillon.material("bell_bronze"))
+        cls.daemon.command("example", "bowl", "--out", cls.folder / "bowl.obj")
+        cls.model = cls.c.create_model(cls.folder / "bowl.obj", "bell_bronze").name
 
     @classmethod
     def bash(cls, text, **options):

@@ -226,6 +226,20 @@ class ContactsTest(PackageTest):
         numpy.testing.assert_allclose(loud.samples, 2 * quiet.samples, atol=1e-3 * loud.peak)
         self.assertLess(slid(10).peak, 1e-3 * loud.peak)
 
+    def test_each_ear_hears_its_own_side_louder_and_behind_and_above_unlike_ahead(self):
+        def heard(*place):
+            trace = carillon.Trace(1 / 240, hearing={"binaural": True})
+            trace.add(self.model, pose=place)
+            trace.step(0.1, impacts=carillon.Impacts(1, [POINT], [IMPULSE], durations=DURATION_S))
+            return self.c.render(trace, channel_count=2, tail_s=0.5).samples
+        for x, y, z in ((1, 0, 0), (0.7, 0.2, -0.7), (1, 0, 0.3)):
+            for side, near in ((-1, 0), (1, 1)):
+                powers = numpy.square(heard(side * x, y, z)).mean(axis=0)
+                self.assertGreater(powers[near], 2 * powers[1 - near], (side * x, y, z))  # 3 dB
+        ahead, behind, above = heard(0, 0, -1), heard(0, 0, 1), heard(0, 1, 0)
+        for other in (behind, above):
+            self.assertGreater(numpy.abs(other - ahead).max(), 0.05 * numpy.abs(ahead).max())
+
     def test_warnings_tell_of_points_away_from_the_surface(self):
         far = {"contacts": carillon.Contacts(1, [(0, 0, 1)], [IMPULSE])}
         with self.assertWarns(carillon.ContactWarning) as told:
