@@ -128,8 +128,16 @@ void AccelerationNoise::Begin(const SurfaceImpulse& impulse, size_t offset, floa
   const Weights weights = bearing != nullptr ? WeightsTowards(*bearing, by) : MeanWeights(by);
   double magnitude = 0;
   for (const double weight : weights) magnitude += std::abs(weight);
-  if (!(magnitude > 0) || !std::isfinite(magnitude) || pulses_.size() == kMostPulses) return;
-  const double duration_s = PulseFrames(impulse.pulse) / rate_;
+  if (!(magnitude > 0) || !std::isfinite(magnitude)) return;
+  double duration_s = PulseFrames(impulse.pulse) / rate_;
+  ActivePulse* joined = nullptr;
+  if (pulses_.size() == kMostPulses) {
+    joined = MostLike(offset, duration_s);
+    if (joined == nullptr) return;
+    offset = joined->begin;
+    lead_frames = static_cast<float>(joined->lead_s * rate_);
+    duration_s = joined->duration_s;
+  }
   const double end = static_cast<double>(offset) - lead_frames + duration_s * rate_;
   const double rad_per_s = 2 * kPi / duration_s;
   ActivePulse active{.begin = offset,
@@ -149,7 +157,27 @@ void AccelerationNoise::Begin(const SurfaceImpulse& impulse, size_t offset, floa
   active.phasor = {.re = sum.re * std::cos(lead) - sum.im * std::sin(lead),
                    .im = sum.re * std::sin(lead) + sum.im * std::cos(lead)};
   active.turn = {.re = std::cos(step), .im = std::sin(step)};
-  pulses_.push_back(active);
+  if (joined == nullptr) return pulses_.push_back(active);
+  for (size_t source = 0; source < kSources; ++source) joined->weights[source] += weights[source];
+  joined->phasor.re += active.phasor.re;
+  joined->phasor.im += active.phasor.im;
+}
+
+/// Returns the pulse that is about to start and differs least from one of this begin and duration,
+/// or null if all have started.
+AccelerationNoise::ActivePulse* AccelerationNoise::MostLike(size_t begin,
+                                                            double duration_s) noexcept {
+  ActivePulse* nearest = nullptr;
+  double least = 0;
+  for (ActivePulse& pulse : pulses_) {
+    if (pulse.begun) continue;
+    const double differs = std::abs(static_cast<double>(pulse.begin) - static_cast<double>(begin)) +
+                           std::abs(pulse.duration_s - duration_s) * rate_;
+    if (nearest != nullptr && differs >= least) continue;
+    nearest = &pulse;
+    least = differs;
+  }
+  return nearest;
 }
 
 AccelerationNoise::Weights AccelerationNoise::WeightsTowards(const Bearing& bearing,

@@ -56,8 +56,8 @@ struct MovedBody {
 /// allocates; nothing locks.
 class AccelerationNoise {
  public:
-  /// The number of pulses of one body that may sound at once. Further impulses add no acceleration
-  /// noise.
+  /// The number of pulses of one body that may sound at once. A further impulse joins the pulse
+  /// most like its own that is about to start. If all sound already, it adds no acceleration noise.
   static constexpr size_t kMostPulses = 16;
 
   /// `samples_per_pascal` includes the object's gain.
@@ -117,6 +117,7 @@ class AccelerationNoise {
   Accelerations AccelerationsBy(const SurfaceImpulse& impulse) const noexcept;
   Weights WeightsTowards(const Bearing& bearing, const Accelerations& by) noexcept;
   Weights MeanWeights(const Accelerations& by) const noexcept;
+  ActivePulse* MostLike(size_t begin, double duration_s) noexcept;
   Number ResponseAt(size_t source, double rad_per_s) const noexcept;
   void Kick(const ActivePulse& pulse, double sign, double time_s) noexcept;
   size_t StartAndEndPulses(size_t at, size_t frame_count) noexcept;

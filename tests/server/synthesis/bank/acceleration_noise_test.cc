@@ -134,6 +134,26 @@ TEST(AccelerationNoise, DoesNotDependOnWhereInABlockOrAFrameItBegins) {
   EXPECT_LT(LargestDifference(early, lead), 1e-6 * Peak(early));
 }
 
+TEST(AccelerationNoise, OfManyBlowsAtOnceIsTheSumOfTheirs) {
+  constexpr size_t kBlows = 8 * AccelerationNoise::kMostPulses;
+  for (const double spread : {0.0, 0.2}) {
+    AccelerationNoise noise(Ball(), kRate, 1);
+    std::vector<float> sum(kFrames);
+    for (size_t i = 0; i < kBlows; ++i) {
+      const double share = spread * static_cast<double>(i * 37 % kBlows) / kBlows;
+      const Blow blow{.impulse = {0, 0, -1e-4F},
+                      .duration_s = 5e-4 * (1 + share),
+                      .offset = static_cast<size_t>(20 * share)};
+      noise.Begin(ImpulseOf(blow), blow.offset, blow.lead_frames, nullptr);
+      const std::vector<float> alone = Sound(blow, nullptr);
+      for (size_t n = 0; n < kFrames; ++n) sum[n] += alone[n];
+    }
+    // A pulse lasts as long as another one of the sixteen, which differs by a sixteenth of their
+    // spread if their durations are spread evenly, and by the whole spread at the worst.
+    EXPECT_LT(LargestDifference(Render(noise), sum), (1e-5 + spread / 4) * Peak(sum)) << spread;
+  }
+}
+
 TEST(AccelerationNoise, BoundsHowLongAPulseLasts) {
   const AccelerationNoise noise(Ball(), kRate, 1);
   EXPECT_EQ(noise.PulseFrames(Pulse()), 2);
