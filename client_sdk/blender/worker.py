@@ -108,7 +108,7 @@ def _in_blender(text, found):
     text = re.sub(r"near ([\d.e-]+) s\b", lambda at: f"near frame {first + float(at[1]) * rate:.1f}", text)
     text = re.sub(r"--wall (\d[\d.e-]*)", r"a Wall of \1 m", text)
     text = re.sub(r"^carillon: (?=try )", "", text, flags=re.MULTILINE)
-    return re.sub(r"\(?--(wall|repair)\b\)?", lambda option: option[1].title(), text)
+    return re.sub(r"\(?--(wall|repair|material)\b\)?", lambda option: option[1].title(), text)
 
 
 def _are_few(found):

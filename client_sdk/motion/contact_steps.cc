@@ -104,7 +104,7 @@ class StepMaker {
     Set(*row->mutable_point_m(), first.point_m);
     if (settings_.handles[second.body] == 0) {
       const double mass_kg = motion_.bodies[second.body].mass_kg;
-      row->mutable_hertz()->set_striker(settings_.silent_striker);
+      row->mutable_hertz()->set_striker(settings_.strikers[second.body]);
       row->mutable_hertz()->set_striker_mass_kg(mass_kg > 0 ? mass_kg : kImmovableMassKg);
       if (!(mass_kg > 0)) row->mutable_hertz()->set_striker_radius_m(kFlatRadiusM);
       return row;

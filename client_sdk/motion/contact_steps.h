@@ -13,8 +13,9 @@ namespace carillon::motion {
 struct StepSettings {
   /// The handle of each body, zero for a silent one.
   std::vector<uint32_t> handles;
-  /// What a silent body strikes like, a name of the catalogue of strikers.
-  std::string silent_striker = "steel";
+  /// What each body strikes like if it is silent: a name of the catalogue of strikers, or a
+  /// material for one that never moves.
+  std::vector<std::string> strikers;
   double roughness_depth = 0;  ///< of every load, as in Roughness
   double irregularity_length_m = 0.001;
 };

@@ -10,6 +10,7 @@
 #include "client_sdk/motion/contact_problem.h"
 #include "client_sdk/motion/contact_reading.h"
 #include "client_sdk/motion/contact_search.h"
+#include "client_sdk/motion/free_fall.h"
 #include "client_sdk/motion/in_parallel.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -154,6 +155,52 @@ void SetDeepest(const Motion& motion, const SearchBodies& bodies, FoundContacts&
   }
 }
 
+/// Says which body is deepest in another in the middle of a free fall, in which it touches nothing.
+void SetSunk(const Motion& motion, const SearchBodies& bodies, Confidence& confidence) {
+  const auto half_m = [&](size_t body) {
+    return bodies.surfaces[body]->box().sizes().minCoeff() / 2 + motion.bodies[body].rounding_m;
+  };
+  for (size_t body = 0; body < motion.bodies.size(); ++body) {
+    const BodyMotion& moves = bodies.motions[body];
+    const size_t frame = moves.balanced() ? FindFreeFall(moves, motion, 1).frame : 0;
+    for (size_t other = 0; frame > 0 && other < motion.bodies.size(); ++other) {
+      if (other == body) continue;
+      const double depth_m = -std::min(Distance(motion, bodies, body, other, frame, 0),
+                                       Distance(motion, bodies, other, body, frame, 0));
+      const double part = depth_m / std::min(half_m(body), half_m(other));
+      // What is wholly inside, as in a room that is drawn as a solid, is there on purpose.
+      if (part <= confidence.sunk_part || depth_m > 2 * moves.radius_m()) continue;
+      confidence.sunk_part = part;
+      confidence.sunk_m = depth_m;
+      confidence.sunk_a = body;
+      confidence.sunk_b = other;
+    }
+  }
+}
+
+/// Says how far apart the bodies of the strongest blow are.
+void SetApart(const SearchBodies& bodies, FoundContacts& found) {
+  const FoundBlow* strongest = nullptr;
+  double most = 0;
+  for (const FoundBlow& blow : found.blows) {
+    const double size = blow.impulse_newton_seconds.norm();
+    if (size <= most) continue;
+    most = size;
+    strongest = &blow;
+  }
+  if (strongest == nullptr) return;
+  const auto place = [&](uint32_t body, const Vector& point_m) -> Vector {
+    const BodyMotion& motion = bodies.motions[body];
+    const BodyPose at = motion.At(strongest->frame, strongest->time_s, Path::kKnown);
+    return at.position_m + at.orientation * (point_m - motion.centre_m());
+  };
+  const double apart_m =
+      (place(strongest->a, strongest->point_a_m) - place(strongest->b, strongest->point_b_m))
+          .norm();
+  found.confidence.apart_part = apart_m / std::min(bodies.motions[strongest->a].radius_m(),
+                                                   bodies.motions[strongest->b].radius_m());
+}
+
 }  // namespace
 
 absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_coarse) {
@@ -182,6 +229,8 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
   SetAmbiguity(found, others, motion.frame_s);
   SetNearest(motion, *bodies, found.confidence);
   SetDeepest(motion, *bodies, found);
+  SetSunk(motion, *bodies, found.confidence);
+  SetApart(*bodies, found);
   return found;
 }
 

@@ -119,6 +119,13 @@ struct Confidence {
   /// part of the radius of the smaller one, and which bodies these are.
   double deepest_part = 0, deepest_m = 0;
   size_t deepest_a = 0, deepest_b = 0;
+  /// How deep one of two bodies is inside of the other while it falls freely, as a part of half the
+  /// least side of the thinner one, and which bodies these are.
+  double sunk_part = 0, sunk_m = 0;
+  size_t sunk_a = 0, sunk_b = 0;
+  /// How far apart the bodies of the strongest blow are then, as a part of the radius of the
+  /// smaller one.
+  double apart_part = 0;
 };
 
 /// The contacts that explain a motion.

@@ -341,7 +341,8 @@ absl::Status RenderClips(const client::Client& daemon, const RenderOptions& opti
     std::vector<std::string> traces;
     traces.reserve(mine.size());
     for (const std::string& clip : mine) traces.push_back(TracePath(options, clip));
-    RETURN_IF_ERROR(AwaitTransfers(daemon, traces));
+    AwaitedJobs jobs(daemon, stop);
+    RETURN_IF_ERROR(AwaitTransfers(jobs, traces));
   }
   ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());
   ASSIGN_OR_RETURN(const ClipFolder folder, ClipFolder::Open(options.out));

@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "carillon/client.h"
+#include "client_sdk/cli/commands/awaited_jobs.h"
 #include "client_sdk/cli/commands/example_bodies.h"
 #include "client_sdk/cli/commands/material_figures.h"
 #include "client_sdk/cli/commands/program.h"
@@ -216,12 +217,13 @@ absl::Status Strike(const client::Client& daemon, const StrikeOptions& options,
 absl::Status Listen(const client::Client& daemon, const ListenOptions& options,
                     const StopSignal& stop, bool json);
 /// Renders a trace to a file. As JSON, `members` follow the summary. Returns the options by which
-/// another trace of the same objects is rendered at the same scale, without `normalize` and `wait`.
+/// another trace of the same objects is rendered at the same scale, without `normalize`. The caller
+/// sees to `wait` before (AwaitTransfers).
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members = {});
 /// Lets the daemon compute the transfers that the objects of traces lack, and shows the progress.
 /// Passes over what a trace has wrong: its rendering says why. Errors: those of the jobs.
-absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces);
+absl::Status AwaitTransfers(AwaitedJobs& jobs, const std::vector<std::string>& traces);
 v1::RenderSettings SettingsOf(const RenderOptions& options);
 /// Returns how the sound of a trace is written to the file `path`.
 RenderedForm FormOf(const RenderOptions& options, const std::string& path);

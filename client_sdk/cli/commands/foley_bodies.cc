@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
@@ -40,6 +41,27 @@ std::optional<std::string> Chosen(const std::vector<BodyChoice>& choices, const 
     if (Fits(pattern, name)) chosen = value;
   }
   return chosen;
+}
+
+/// Whether a pattern fits one name alone.
+bool IsName(const std::string& pattern) {
+  for (size_t i = 0; i < pattern.size(); ++i) {
+    if (pattern[i] == '\\') {
+      ++i;
+    } else if (absl::string_view("*?[").find(pattern[i]) != absl::string_view::npos) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Whether the last fitting choice names the body.
+bool IsNamed(const std::vector<BodyChoice>& choices, const std::string& name) {
+  bool named = false;
+  for (const auto& [pattern, value] : choices) {
+    if (Fits(pattern, name)) named = IsName(pattern);
+  }
+  return named;
 }
 
 absl::Status CheckPattern(const std::string& option, const std::string& pattern,
@@ -117,15 +139,6 @@ absl::Status SetSurface(const FoleyOptions& options, MovingBody& body) {
   return absl::OkStatus();
 }
 
-void Scale(double metres_per_unit, MovingBody& body) {
-  for (Vector& vertex : body.surface.vertices_m) vertex *= metres_per_unit;
-  for (Vector& vertex : body.collider.vertices_m) vertex *= metres_per_unit;
-  body.rounding_m *= metres_per_unit;
-  for (motion::BodyPose& pose : body.poses) pose.position_m *= metres_per_unit;
-  body.centre_of_mass_m *= metres_per_unit;
-  body.inertia_kg_m2 *= metres_per_unit * metres_per_unit;
-}
-
 /// Sets mass, centre and inertia of a body that moves. Without a mass in the file it is that of the
 /// material; the inertia is that of a solid, as simulators take it.
 absl::Status SetMass(const FoleyOptions& options, const motion::SceneBody& given, FoleyBody& sounds,
@@ -177,14 +190,19 @@ void AddFloor(double height_m, const Vector& gravity, FoleyScene& foley) {
 
 absl::Status SetBody(const FoleyOptions& options, const motion::SceneBody& given, MovingBody& body,
                      FoleyBody& sounds) {
-  if (body.name != "floor" || !options.floor_m) {
+  sounds.endless = body.name == "floor" && options.floor_m;
+  if (!sounds.endless) {
     RETURN_IF_ERROR(SetSurface(options, body));
-    Scale(options.metres_per_unit, body);
+    ScaleShape(options.metres_per_unit, body);
+    for (motion::BodyPose& pose : body.poses) pose.position_m *= options.metres_per_unit;
     motion::TurnOutward(body.surface);
     motion::TurnOutward(body.collider);
   }
   if (options.friction > 0) body.friction = options.friction;
   ASSIGN_OR_RETURN(sounds.material, MaterialOf(options, body.name, given.material));
+  if (sounds.endless || (body.poses.size() == 1 && !IsNamed(options.materials, body.name))) {
+    sounds.scenery = std::exchange(sounds.material, "");
+  }
   if (const auto wall = Chosen(options.walls, body.name)) {
     ASSIGN_OR_RETURN(sounds.wall_m, NumberOf("--wall", {body.name, *wall}));
   }
@@ -194,6 +212,14 @@ absl::Status SetBody(const FoleyOptions& options, const motion::SceneBody& given
 }
 
 }  // namespace
+
+void ScaleShape(double factor, MovingBody& body) {
+  for (Vector& vertex : body.surface.vertices_m) vertex *= factor;
+  for (Vector& vertex : body.collider.vertices_m) vertex *= factor;
+  body.rounding_m *= factor;
+  body.centre_of_mass_m *= factor;
+  body.inertia_kg_m2 *= factor * factor;
+}
 
 absl::StatusOr<FoleyScene> ReadFoleyScene(const FoleyOptions& options) {
   const bool is_gltf = absl::EndsWithIgnoreCase(options.file, ".glb") ||

@@ -13,6 +13,8 @@ namespace carillon::cli {
 /// How a body sounds, and what it is in the balance.
 struct FoleyBody {
   std::string material;  ///< empty: silent
+  std::string scenery;   ///< the material of a silent body that never moves; empty: unknown
+  bool endless = false;  ///< the floor of --floor, which has no sound
   double wall_m = 0;     ///< zero: solid
   bool closed = false;
   bool repair = false;
@@ -28,5 +30,8 @@ struct FoleyScene {
 /// Reads the file, and gives the bodies surfaces, materials, masses and a floor. Errors: as for
 /// MakeFoley.
 absl::StatusOr<FoleyScene> ReadFoleyScene(const FoleyOptions& options);
+
+/// Makes all of a body but its motion larger by a factor. Its mass stays.
+void ScaleShape(double factor, motion::MovingBody& body);
 
 }  // namespace carillon::cli

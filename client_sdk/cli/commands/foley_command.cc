@@ -13,11 +13,12 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
+#include "client_sdk/cli/commands/awaited_jobs.h"
 #include "client_sdk/cli/commands/foley_bodies.h"
-#include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/motion/contact_steps.h"
 #include "client_sdk/motion/find_contacts.h"
+#include "client_sdk/motion/free_fall.h"
 #include "client_sdk/motion/pose_noise.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/escaped_text.h"
@@ -31,11 +32,21 @@ using motion::MovingBody;
 
 /// Engines let bodies overlap by less than this part of the smaller one's radius.
 constexpr double kDeep = 0.1;
+/// While it falls freely, a body is outside of others but for a part of its thickness.
+constexpr double kSunk = 0.1;
+/// Bodies that strike each other are less than this part of the smaller one's radius apart.
+constexpr double kApart = 0.5;
 /// Shares of unexplained momentum from which the masses or shapes are doubtful, and from which the
 /// contacts are wrong (docs/motion.md).
 constexpr double kDoubtful = 0.001, kWrong = 0.03;
 /// From this share on solutions that differ in their impulses explain the motion alike.
 constexpr double kAmbiguous = 0.2;
+
+motion::Vector SidesOf(const MovingBody& body) {
+  Eigen::AlignedBox3d box;
+  for (const motion::Vector& vertex : body.surface.vertices_m) box.extend(vertex);
+  return box.sizes();
+}
 
 void List(const FoleyScene& foley) {
   const motion::Motion& motion = foley.scene.motion;
@@ -45,13 +56,13 @@ void List(const FoleyScene& foley) {
     const MovingBody& body = motion.bodies[i];
     const FoleyBody& sounds = foley.bodies[i];
     const char* moves = body.poses.size() == 1 ? "fixed" : body.mass_kg > 0 ? "free" : "driven";
-    Eigen::AlignedBox3d box;
-    for (const motion::Vector& vertex : body.surface.vertices_m) box.extend(vertex);
-    const motion::Vector sides_m = box.sizes();
+    const motion::Vector sides_m = SidesOf(body);
     absl::PrintF("%-20s  %-6s  %-16s  %10.4g kg  %.3g x %.3g x %.3g m  %6d triangles, %s%s\n",
                  EscapedText(body.name), moves,
-                 sounds.material.empty() ? "silent" : sounds.material, body.mass_kg, sides_m.x(),
-                 sides_m.y(), sides_m.z(), body.surface.triangles.size(),
+                 !sounds.material.empty() ? sounds.material
+                 : sounds.scenery.empty() ? "silent"
+                                          : absl::StrCat("silent (", sounds.scenery, ")"),
+                 body.mass_kg, sides_m.x(), sides_m.y(), sides_m.z(), body.surface.triangles.size(),
                  sounds.closed ? "closed" : "open",
                  foley.scene.bodies[i].material.empty()
                      ? ""
@@ -60,6 +71,24 @@ void List(const FoleyScene& foley) {
   for (const motion::SceneListener& listener : foley.scene.listeners) {
     absl::PrintF("%-20s  camera\n", EscapedText(listener.name));
   }
+}
+
+/// Says which bodies are silent because they never move: their models would take the most time.
+void TellScenery(const FoleyScene& foley) {
+  std::vector<std::string> still;
+  const FoleyBody* first = nullptr;
+  for (size_t i = 0; i < foley.bodies.size(); ++i) {
+    const FoleyBody& body = foley.bodies[i];
+    if (body.scenery.empty() || body.endless) continue;
+    if (first == nullptr) first = &body;
+    still.push_back(foley.scene.motion.bodies[i].name);
+  }
+  if (still.empty()) return;
+  absl::FPrintF(stderr,
+                "warning: %s never moves, and is silent, though of a material: to hear it, name it "
+                "without a wildcard (--material '%s=%s'), which may take minutes\n",
+                EscapedText(absl::StrJoin(still, ", ")), EscapedText(still.front()),
+                first->scenery);
 }
 
 absl::Status CheckSounds(const FoleyScene& foley) {
@@ -80,7 +109,8 @@ absl::Status CheckSounds(const FoleyScene& foley) {
   }
   if (sounds) return absl::OkStatus();
   return Refusal(absl::StatusCode::kInvalidArgument, "BODY_UNKNOWN",
-                 "no body has a material: name one, such as --material '*=oak', or see --list");
+                 "no body that moves has a material: name one, such as --material '*=oak', or see "
+                 "--list");
 }
 
 /// Leaves each n-th frame of noisy poses. A hat function of n frames takes the noise of a pose for
@@ -100,8 +130,57 @@ void TakeNoiseOut(motion::MotionScene& scene) {
                 noise.suffices ? "" : ", which still shows impacts that never were");
 }
 
+std::string UnitName(double metres) {
+  if (metres == 1) return "metres";
+  if (metres == 0.01) return "centimetres";
+  return metres == 0.001 ? "millimetres" : absl::StrCat("units of ", metres, " m");
+}
+
+/// Refuses poses whose bodies fall as gravity would let them fall in another unit of length.
+absl::Status CheckFall(const motion::Motion& motion, const FoleyOptions& options) {
+  const motion::LengthMistake mistake = motion::FindLengthMistake(motion);
+  if (mistake.factor == 1) return absl::OkStatus();
+  const MovingBody& body = motion.bodies[mistake.body];
+  const double gravity = motion.gravity_m_per_s2.norm();
+  const std::string unit = UnitName(options.metres_per_unit / mistake.factor);
+  absl::Status refusal = Refusal(
+      absl::StatusCode::kInvalidArgument, "MOTION_UNIT_WRONG",
+      absl::StrCat(body.name, " falls at ", mistake.factor * gravity, " m/s^2, and gravity is ",
+                   gravity, ": the poses are in ", unit, ", and are read as ",
+                   UnitName(options.metres_per_unit),
+                   ". --unit has the unit of the poses and of the meshes; where "
+                   "both differ, convert one (as it is read, ",
+                   body.name, " is ", absl::SixDigits(SidesOf(body).maxCoeff()), " m long)"));
+  if (!options.force) return refusal;
+  absl::FPrintF(stderr, "warning: %s\n", EscapedText(ToErrorInfo(refusal).message()));
+  return absl::OkStatus();
+}
+
+/// Returns by which factor all meshes would have to be larger for contacts to explain the motion
+/// best, or 1 if none lets them explain it.
+double FindMeshFactor(const FoleyScene& foley, const motion::FoundContacts& found) {
+  const bool may_be_small = found.confidence.sunk_part <= kSunk;
+  double best = 1, least = kWrong;
+  for (const double factor : {0.01, 0.001, 100.0, 1000.0}) {
+    if (factor > 1 && !may_be_small) continue;
+    motion::Motion scaled = foley.scene.motion;
+    for (size_t i = 0; i < scaled.bodies.size(); ++i) {
+      if (!foley.bodies[i].endless) ScaleShape(factor, scaled.bodies[i]);
+    }
+    const absl::StatusOr<motion::FoundContacts> other = motion::FindContacts(scaled, true);
+    if (!other.ok() || other->blows.empty()) continue;
+    const motion::Confidence& is = other->confidence;
+    const bool fits = is.deepest_part <= kDeep && is.sunk_part <= kSunk && is.apart_part <= kApart;
+    if (!fits || is.unexplained >= least) continue;
+    least = is.unexplained;
+    best = factor;
+  }
+  return best;
+}
+
 /// Refuses contacts that do not explain the motion, and warns of doubtful ones.
-absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& found, bool force) {
+absl::Status Judge(const FoleyScene& foley, const motion::FoundContacts& found, bool force) {
+  const motion::Motion& motion = foley.scene.motion;
   const motion::Confidence& is = found.confidence;
   const std::string& worst = motion.bodies[is.worst_body].name;
   const double time_s = motion.first_time_s + static_cast<double>(is.worst_frame) * motion.frame_s;
@@ -128,9 +207,27 @@ absl::Status Judge(const motion::Motion& motion, const motion::FoundContacts& fo
                   "sure\n",
                   100 * is.unexplained, EscapedText(where));
   }
+  if (is.sunk_part > kSunk) {
+    absl::FPrintF(
+        stderr,
+        "warning: %s is up to %.3g m inside of %s while it falls freely: is the height of "
+        "the floor (--floor), the unit (--unit) or a mesh (--mesh) wrong?\n",
+        EscapedText(motion.bodies[is.sunk_a].name), is.sunk_m,
+        EscapedText(motion.bodies[is.sunk_b].name));
+  }
   if (force) return absl::OkStatus();
+  const bool nothing = found.blows.empty() && found.loads.empty();
+  const bool fits =
+      is.unexplained <= kWrong && !nothing && is.sunk_part <= kSunk && is.apart_part <= kApart;
+  if (const double factor = fits ? 1 : FindMeshFactor(foley, found); factor != 1) {
+    return Refusal(absl::StatusCode::kInvalidArgument, "MOTION_UNIT_WRONG",
+                   absl::StrCat("contacts explain the motion if all meshes are ", factor,
+                                " times as large, and not as they are (", worst, " is ",
+                                absl::SixDigits(SidesOf(motion.bodies[is.worst_body]).maxCoeff()),
+                                " m long): give poses and meshes in one unit, which --unit names"));
+  }
   if (is.unexplained <= kWrong) {
-    if (!found.blows.empty() || !found.loads.empty()) return absl::OkStatus();
+    if (!nothing) return absl::OkStatus();
     return Refusal(absl::StatusCode::kInvalidArgument, "MOTION_WITHOUT_CONTACT",
                    "no body touches another, so there is nothing to hear: is a floor missing or "
                    "at the wrong height (--floor), or the unit (--unit) wrong?");
@@ -178,7 +275,7 @@ void WeighByMaterial(const FoleyScene& foley, motion::FoundContacts& found) {
 /// Makes the models of the bodies that sound; bodies of one surface and material share one.
 class FoleyModels {
  public:
-  explicit FoleyModels(const client::Client& daemon) : daemon_(daemon) {}
+  explicit FoleyModels(AwaitedJobs& jobs) : awaited_(jobs), daemon_(jobs.daemon()) {}
 
   absl::Status Request(const MovingBody& body, const FoleyBody& sounds) {
     const std::string obj = motion::ObjText(body.surface);
@@ -198,18 +295,20 @@ class FoleyModels {
     request.set_min_frequency_hz(20);
     request.set_label(body.name);
     ASSIGN_OR_RETURN(at->second, daemon_.CreateModalModel(request));
+    if (at->second.state() != v1::JOB_STATE_SUCCEEDED) awaited_.Add(at->second.name());
     return absl::OkStatus();
   }
 
   absl::StatusOr<std::string> Await(const MovingBody& body) {
     v1::Job& job = jobs_[keys_[&body]];
     if (job.state() != v1::JOB_STATE_SUCCEEDED) {
-      ASSIGN_OR_RETURN(job, WatchWithProgress(daemon_, job.name()));
+      ASSIGN_OR_RETURN(job, awaited_.Await(job.name()));
     }
     return job.modal_model();
   }
 
  private:
+  AwaitedJobs& awaited_;
   const client::Client& daemon_;
   std::map<const MovingBody*, std::string> keys_;
   std::map<std::string, v1::Job> jobs_;
@@ -300,7 +399,7 @@ absl::StatusOr<const motion::SceneListener*> FindListener(const FoleyOptions& op
                  absl::StrCat("no camera has the name ", options.listener, ": see --list"));
 }
 
-absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOptions& options,
+absl::StatusOr<FoleyTrace> MakeTrace(AwaitedJobs& jobs, const FoleyOptions& options,
                                      const FoleyScene& foley, const motion::FoundContacts& found) {
   const motion::Motion& motion = foley.scene.motion;
   FoleyTrace trace;
@@ -312,10 +411,14 @@ absl::StatusOr<FoleyTrace> MakeTrace(const client::Client& daemon, const FoleyOp
     trace.header.mutable_hearing()->set_panning(options.sound.channel_count > 1);
     Set(*trace.header.mutable_listener(), listener->poses.front());
   }
-  FoleyModels models(daemon);
+  FoleyModels models(jobs);
   motion::StepSettings settings{.handles = std::vector<uint32_t>(motion.bodies.size(), 0),
-                                .silent_striker = options.silent_striker,
+                                .strikers = {},
                                 .roughness_depth = options.roughness_depth};
+  settings.strikers.reserve(foley.bodies.size());
+  for (const FoleyBody& body : foley.bodies) {
+    settings.strikers.push_back(body.scenery.empty() ? options.silent_striker : body.scenery);
+  }
   for (size_t i = 0; i < motion.bodies.size(); ++i) {
     if (foley.bodies[i].material.empty()) continue;
     RETURN_IF_ERROR(models.Request(motion.bodies[i], foley.bodies[i]));
@@ -374,14 +477,18 @@ absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
     List(foley);
     return absl::OkStatus();
   }
+  TellScenery(foley);
   RETURN_IF_ERROR(CheckSounds(foley));
+  const StopSignal stop;  // before the search for contacts starts threads
+  const auto daemon = program.Daemon();
+  AwaitedJobs jobs(*daemon, stop);
   TakeNoiseOut(foley.scene);
+  RETURN_IF_ERROR(CheckFall(foley.scene.motion, options));
   ASSIGN_OR_RETURN(motion::FoundContacts found,
                    motion::FindContacts(foley.scene.motion, options.force));
-  RETURN_IF_ERROR(Judge(foley.scene.motion, found, options.force));
+  RETURN_IF_ERROR(Judge(foley, found, options.force));
   if (options.material_masses) WeighByMaterial(foley, found);
-  const auto daemon = program.Daemon();
-  ASSIGN_OR_RETURN(const FoleyTrace trace, MakeTrace(*daemon, options, foley, found));
+  ASSIGN_OR_RETURN(const FoleyTrace trace, MakeTrace(jobs, options, foley, found));
   const std::string temporary =
       (fs::temp_directory_path() / absl::StrCat("carillon-foley-", getpid(), ".contacts")).string();
   const absl::Cleanup remove = [&temporary] {
@@ -395,6 +502,7 @@ absl::Status MakeFoley(const Program& program, const FoleyOptions& options) {
   RenderOptions sound = options.sound;
   sound.trace = temporary;
   RETURN_IF_ERROR(trace.Write(temporary, earlier_s));
+  if (sound.wait) RETURN_IF_ERROR(AwaitTransfers(jobs, {temporary}));
   ASSIGN_OR_RETURN(const RenderOptions whole, Render(*daemon, sound, program.json));
   return options.stems.empty() ? absl::OkStatus()
                                : RenderStems(*daemon, options, whole, trace, earlier_s);

@@ -40,7 +40,7 @@ struct FoleyOptions {
 /// Makes the motion of bodies audible: finds the contacts that explain it, computes the bodies'
 /// models, and renders the contacts. Errors: those of ReadGltfMotion, ReadPoseTable, FindContacts,
 /// of models and of Render, and InvalidArgument (BODY_UNKNOWN, SURFACE_OPEN, MOTION_UNEXPLAINED,
-/// MOTION_WITHOUT_CONTACT).
+/// MOTION_UNIT_WRONG, MOTION_WITHOUT_CONTACT).
 absl::Status MakeFoley(const Program& program, const FoleyOptions& options);
 
 }  // namespace carillon::cli

@@ -13,7 +13,6 @@
 #include "absl/strings/str_format.h"
 #include "client_sdk/cli/commands/commands.h"
 #include "client_sdk/cli/commands/trace_page.h"
-#include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
 #include "client_sdk/cli/output/rendered_file.h"
 #include "proto/cpp/error_reason.h"
@@ -109,7 +108,7 @@ void PrintRenderingJson(const RenderOptions& options, const v1::RenderSummary& s
 
 }  // namespace
 
-absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std::string>& traces) {
+absl::Status AwaitTransfers(AwaitedJobs& jobs, const std::vector<std::string>& traces) {
   std::map<std::string, v1::CreateTransferRequest> requests;
   for (const std::string& path : traces) {
     auto trace = client::ContactTraceReader::Open(path);
@@ -130,12 +129,12 @@ absl::Status AwaitTransfers(const client::Client& daemon, const std::vector<std:
   }
   std::vector<std::string> unfinished;
   for (const auto& [key, request] : requests) {
-    const absl::StatusOr<v1::Job> job = daemon.CreateTransfer(request);
-    if (job.ok() && job->state() != v1::JOB_STATE_SUCCEEDED) unfinished.push_back(job->name());
+    const absl::StatusOr<v1::Job> job = jobs.daemon().CreateTransfer(request);
+    if (!job.ok() || job->state() == v1::JOB_STATE_SUCCEEDED) continue;
+    unfinished.push_back(job->name());
+    jobs.Add(job->name());
   }
-  for (const std::string& job : unfinished) {
-    RETURN_IF_ERROR(WatchWithProgress(daemon, job).status());
-  }
+  for (const std::string& job : unfinished) RETURN_IF_ERROR(jobs.Await(job).status());
   return absl::OkStatus();
 }
 
@@ -191,7 +190,6 @@ absl::Status CheckHasContacts(const std::string& path, const v1::RenderSummary& 
 
 absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderOptions& options,
                                      bool json, std::vector<JsonMember> members) {
-  if (options.wait) RETURN_IF_ERROR(AwaitTransfers(daemon, {options.trace}));
   RenderedFile file(FormOf(options, options.out));
   v1::ContactTraceHeader header;
   RenderedTrace page{.trace = options.trace, .wave = options.out};
@@ -231,7 +229,6 @@ absl::StatusOr<RenderOptions> Render(const client::Client& daemon, const RenderO
   }
   RenderOptions alike = options;
   alike.normalize = false;
-  alike.wait = false;  // the transfers are there now
   alike.gain = file.factor();
   if (settings.has_full_scale_pa()) alike.full_scale_pa = settings.full_scale_pa();
   return alike;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <csignal>
 #include <ctime>
 
@@ -17,14 +18,17 @@ class StopSignal {
     pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
   }
 
-  /// Waits for one of the signals. Returns true as soon as it arrives, or false if none has arrived
-  /// after `seconds`.
-  bool ArrivesWithin(double seconds) const {
+  /// Waits for one of the signals. Returns its number as soon as it arrives, or 0 if none has
+  /// arrived after `seconds`.
+  int ArrivesWithin(double seconds) const {
     timespec timeout = {};
     timeout.tv_sec = static_cast<time_t>(seconds);
     timeout.tv_nsec = static_cast<long>((seconds - static_cast<double>(timeout.tv_sec)) * 1e9);
-    return sigtimedwait(&signals_, nullptr, &timeout) > 0;
+    return std::max(0, sigtimedwait(&signals_, nullptr, &timeout));
   }
+
+  /// Lets the signals reach this thread again.
+  void Release() const { pthread_sigmask(SIG_UNBLOCK, &signals_, nullptr); }
 
  private:
   sigset_t signals_;

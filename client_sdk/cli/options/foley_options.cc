@@ -40,7 +40,8 @@ void AddChoice(CLI::App& app, const std::string& name, std::vector<BodyChoice>& 
 void AddBodies(CLI::App& foley, FoleyOptions& options) {
   AddChoice(foley, "--material", options.materials,
             "PATTERN=NAME: what bodies are made of; none keeps them silent. A glTF's material of "
-            "the name of a catalogued one is taken by itself");
+            "the name of a catalogued one is taken by itself. A body that never moves is struck "
+            "as of its material, and sounds only if it is named without a wildcard");
   AddChoice(foley, "--mesh", options.meshes, "PATTERN=FILE.obj: the surface of bodies, closed");
   AddChoice(foley, "--wall", options.walls,
             "PATTERN=METRES: bodies are hollow, with a wall of this thickness");

@@ -149,11 +149,13 @@ void AddRender(CLI::App& app, Program& program) {
     CheckUse(render, *options);
     CheckJson(program, options->out);
     program.command = [&program, options] {
-      if (!IsFolder(options->trace)) {
-        return Render(*program.Daemon(), *options, program.json).status();
-      }
       const StopSignal stop;
-      return RenderClips(*program.Daemon(), *options, stop, program.json);
+      const auto daemon = program.Daemon();
+      if (IsFolder(options->trace)) return RenderClips(*daemon, *options, stop, program.json);
+      AwaitedJobs jobs(*daemon, stop);
+      const absl::Status awaited =
+          options->wait ? AwaitTransfers(jobs, {options->trace}) : absl::OkStatus();
+      return awaited.ok() ? Render(*daemon, *options, program.json).status() : awaited;
     };
   });
 }

@@ -185,6 +185,14 @@ absl::StatusOr<v1::Job> Client::CancelJob(const std::string& name) const {
   return std::move(*response.mutable_job());
 }
 
+absl::StatusOr<v1::Job> Client::WithdrawFromJob(const std::string& name) const {
+  auto request = Named<v1::CancelJobRequest>(name);
+  request.set_only_for_caller(true);
+  v1::CancelJobResponse response;
+  RETURN_IF_ERROR(Call("DecompositionService/CancelJob", request, response));
+  return std::move(*response.mutable_job());
+}
+
 absl::StatusOr<v1::Job> Client::WatchJob(const std::string&,
                                          const std::function<void(const v1::Job&)>&) const {
   return NotOverridden("WatchJob");

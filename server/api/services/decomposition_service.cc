@@ -172,7 +172,7 @@ grpc::ServerUnaryReactor* DecompositionService::CancelJob(grpc::CallbackServerCo
       context, writing_, Role::kSubmit, [this, request, response](const Principal& caller) {
         ASSIGN_OR_RETURN(const std::string digest, ParseJobName(request->name()));
         ASSIGN_OR_RETURN(const v1::Job before, queue_.Get(digest));
-        const bool for_all = caller.has(Role::kAdminister);
+        const bool for_all = caller.has(Role::kAdminister) && !request->only_for_caller();
         ASSIGN_OR_RETURN(
             *response->mutable_job(),
             queue_.Cancel(digest, for_all ? std::nullopt : std::optional(caller.client)));

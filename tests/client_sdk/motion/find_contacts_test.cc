@@ -10,6 +10,7 @@
 #include <random>
 
 #include "client_sdk/motion/contact_steps.h"
+#include "client_sdk/motion/free_fall.h"
 #include "client_sdk/motion/free_turn.h"
 #include "client_sdk/motion/pose_noise.h"
 #include "tests/client_sdk/motion/fall_truth.h"
@@ -184,6 +185,13 @@ TEST(ShootMomentum, FindsTheTurnOfASlenderBody) {
   }
 }
 
+/// What is computed by an engine looks like no mistake of units, by the limits of `carillon foley`.
+void ExpectOneUnit(const Motion& motion, const FoundContacts& found) {
+  EXPECT_EQ(FindLengthMistake(motion).factor, 1);
+  EXPECT_LT(found.confidence.sunk_part, 0.1);
+  EXPECT_LT(found.confidence.apart_part, 0.5);
+}
+
 TEST(FindContacts, FindsBouncesInBulletAtAnyFrameRate) {
   for (const int rate : {24, 30, 60, 120, 240}) {
     const Fall fall = Drop(BounceScene(), falls::FallInBullet, 2400 / rate);
@@ -195,6 +203,7 @@ TEST(FindContacts, FindsBouncesInBulletAtAnyFrameRate) {
     EXPECT_LT(is.median_dt_s, 1e-4) << rate;
     EXPECT_LT(is.median_vector_error, 0.01) << rate;
     EXPECT_LT(is.median_point_m, 0.001) << rate;
+    ExpectOneUnit(fall.motion, found);
   }
 }
 
@@ -216,6 +225,7 @@ TEST(FindContacts, FindsTheCornersOfABoxWhereverTheyLandInAFrame) {
       }
       EXPECT_LT(is.median_dt_s, rate == 120 ? 1e-3 : 5e-4) << rate << " " << i;
       error += is.median_vector_error / kFalls;
+      ExpectOneUnit(fall.motion, found);
       EXPECT_LT(found.confidence.unexplained, rate == 120 ? 0.02 : 0.001) << rate << " " << i;
     }
     EXPECT_LT(error, 0.05) << rate;
@@ -233,6 +243,7 @@ TEST(FindContacts, FindsMostOfPilesAtSixtyFramesAndCallsThemAmbiguous) {
     false_share += is.false_share / kPiles;
     EXPECT_LT(found.confidence.unexplained, i == 0 ? 0.001 : 0.005) << i;
     EXPECT_GT(found.confidence.ambiguity, 0.3) << i;
+    ExpectOneUnit(fall.motion, found);
   }
   EXPECT_GE(found_share, 0.8);
   EXPECT_LE(false_share, 0.15);
@@ -246,6 +257,7 @@ TEST(FindContacts, FindsEqualAndOppositeImpulsesInTheAir) {
   EXPECT_EQ(is.false_count, 0);
   EXPECT_LT(is.median_dt_s, 1e-4);
   EXPECT_LT(is.median_vector_error, 0.05);
+  ExpectOneUnit(fall.motion, found);
 }
 
 TEST(FindContacts, ExplainsAStepThatPushesBothEndsOfABarAtOnce) {
@@ -407,7 +419,7 @@ TEST(ToSteps, GivesABlowInTheFrameOfItsBodyAtItsTime) {
   const Fall fall = Drop(CornerScene(), falls::FallInBullet, 20);
   const FoundContacts found = FindContacts(fall.motion).value();
   const std::vector<v1::ContactStep> steps =
-      ToSteps(fall.motion, found, {.handles = {0, 7}, .silent_striker = "wood"});
+      ToSteps(fall.motion, found, {.handles = {0, 7}, .strikers = {"wood", ""}});
   ASSERT_EQ(steps.size(), fall.motion.frame_count());
   size_t impacts = 0;
   for (const v1::ContactStep& step : steps) {

@@ -4,14 +4,18 @@ from a glTF; what is no motion, or not explained by contacts, is refused by name
 
 import json
 import re
+import signal
+import subprocess
 
 import numpy
 
 import carillon
 import gltf
 import meshes
+import scripted
 import sound
-from daemon import BIN, DaemonTest
+from carillon.v1 import decomposition_pb2, decomposition_service_pb2
+from daemon import BIN, DaemonTest, ScratchTest, wait_until
 
 GRAVITY, HEIGHT_M, RESTITUTION, RATE_HZ = 9.81, 0.2, 0.6, 60
 SIDES_M = (0.2, 0.02, 0.01)
@@ -33,7 +37,7 @@ def heights():
 
 def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Structural Steel", drawn=SIDES_M,
                collider=None, scale=(1, 1, 1), interpolation="LINEAR", flips=False, later_s=0,
-               inward=False, heading=0):
+               inward=False, heading=0, ground=(4, 0.2, 4), ground_material="Ground"):
     """The same fall with y up: a bar in a turned parent, a floor, and a camera that looks along -z. With `flips` the
     quaternion of the bar, which does not turn, changes its sign at each key. `heading` is about the vertical, rad."""
     writer = gltf.Writer()
@@ -66,12 +70,12 @@ def write_gltf(path, *, keys=slice(None), skin=False, mass=None, material="Struc
                                                                      "extras": {"rounding": collider[1]}}
     document = {
         "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
-        "materials": [{"name": material}, {"name": "Ground"}],
-        "meshes": [mesh(drawn / numpy.abs(scale), 0), mesh((4, 0.2, 4), 1)],
+        "materials": [{"name": material}, {"name": ground_material}],
+        "meshes": [mesh(drawn / numpy.abs(scale), 0), mesh(ground, 1)],
         # The bar's own z, along which it falls, is the scene's y.
         "nodes": [{"name": "Turned", "rotation": [-c, s, s, c], "translation": [heading, 0, 0], "children": [1]},
                   bar,
-                  {"name": "Ground", "mesh": 1, "translation": [0, -0.1, 0]},
+                  {"name": "Ground", "mesh": 1, "translation": [0, -ground[1] / 2, 0]},
                   {"name": "Camera", "camera": 0, "translation": [0, 0.3, 1]}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
         "animations": [animation("translation", [(0, 0, z) for z in height])]
@@ -91,13 +95,27 @@ def impacts(path):
             for step in trace.steps for row in step.contacts if row.kind == 2]
 
 
+def write_box(path, sides=SIDES_M, faces=slice(None)):
+    vertices, triangles = meshes.centred_box(sides)
+    path.write_bytes(meshes.obj(vertices, triangles[faces]))
+
+
+def rows_of_poses():
+    return [(f"{t:.9g}", "Bar", 0, 0, f"{z:.9g}", 1, 0, 0, 0) for t, z in zip(*heights())]
+
+
+def write_poses(path, rows, columns="t,body,x,y,z,qw,qx,qy,qz", separator=",", start="", end="\n"):
+    lines = [*([columns] if columns else []), *(",".join(map(str, row)) for row in rows)]
+    path.write_bytes((start + "".join(line.replace(",", separator) + end for line in lines)).encode())
+
+
 class FoleyTest(DaemonTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.write_box("bar.obj")
         times, height = heights()
-        cls.rows = [(f"{t:.9g}", "Bar", 0, 0, f"{z:.9g}", 1, 0, 0, 0) for t, z in zip(times, height)]
+        cls.rows = rows_of_poses()
         cls.write_poses("fall.csv", cls.rows)
         count = len(times)
         numpy.savez(cls.folder / "fall.npz", times=times, bodies=numpy.array(["Bar"]),
@@ -106,15 +124,12 @@ class FoleyTest(DaemonTest):
         write_gltf(cls.folder / "fall.glb")
 
     @classmethod
-    def write_box(cls, name, sides=SIDES_M, faces=slice(None)):
-        vertices, triangles = meshes.centred_box(sides)
-        (cls.folder / name).write_bytes(meshes.obj(vertices, triangles[faces]))
+    def write_box(cls, name, *form, **named):
+        write_box(cls.folder / name, *form, **named)
 
     @classmethod
-    def write_poses(cls, name, rows, columns="t,body,x,y,z,qw,qx,qy,qz", separator=",", start="", end="\n"):
-        lines = [*([columns] if columns else []), *(",".join(map(str, row)) for row in rows)]
-        text = start + "".join(line.replace(",", separator) + end for line in lines)
-        (cls.folder / name).write_bytes(text.encode())
+    def write_poses(cls, name, *form, **named):
+        write_poses(cls.folder / name, *form, **named)
 
     def foley(self, file, *words, check=True):
         return self.daemon.command("foley", self.folder / file, *words, check=check)
@@ -268,6 +283,59 @@ class FoleyTest(DaemonTest):
         self.assertRegex(done.stderr, "(?m)^warning: Die: ")
         self.check_impacts(self.folder / "two.contacts")
 
+    def test_what_never_moves_is_struck_in_silence_as_of_its_material_unless_it_is_named(self):
+        path = self.folder / "scenery.contacts"
+
+        def heard(file, *words):
+            """The labels of the objects, the strikers of the bar's contacts, and what the command says."""
+            done = self.foley(file, "--trace", path, *words)
+            trace = carillon.Trace.read(path)
+            strikers = {row.hertz.striker for step in trace.steps for row in step.contacts if row.HasField("hertz")}
+            return [item.label for item in trace.objects], strikers, done.stderr
+
+        write_gltf(self.folder / "scenery.glb", ground=(0.22, 0.05, 0.05), ground_material="Concrete")
+        for words in ((), ("--material", "G*=concrete")):
+            labels, strikers, told = heard("scenery.glb", *words)
+            self.assertEqual((labels, strikers), (["Bar"], {"concrete"}))
+            self.check_impacts(path)
+            self.assertRegex(told, "(?m)^warning: Ground never moves")
+        labels, strikers, told = heard("scenery.glb", "--material", "Ground=brass")
+        self.assertCountEqual(labels, ["Bar", "Ground"])
+        self.assertNotIn("warning", told)
+        self.assertRegex(self.foley("scenery.glb", "--list").stdout, r"Ground +fixed +silent \(concrete\)")
+        # An endless floor has no sound, whatever it is named.
+        labels, strikers, told = heard("fall.csv", "--mesh", f"Bar={self.folder / 'bar.obj'}", "--floor", 0,
+                                       "--material", "Bar=structural_steel", "--material", "floor=oak")
+        self.assertEqual((labels, strikers), (["Bar"], {"oak"}))
+        self.assertNotIn("warning", told)
+        write_gltf(self.folder / "still.glb", material="none of these", ground_material="Concrete", mass=MASS_KG)
+        self.refused("BODY_UNKNOWN", self.foley("still.glb", "--trace", path, check=False))
+
+    def test_meshes_and_poses_in_two_units_are_named(self):
+        def moved(name, factor):
+            self.write_poses(name, [(t, body, x, y, float(z) * factor, *q) for t, body, x, y, z, *q in self.rows])
+            return name
+
+        out = ("--floor", 0, "--trace", self.folder / "units.contacts")
+        centi, milli = moved("centi.csv", 100), moved("milli_poses.csv", 1000)
+        for factor in (0.01, 0.001, 100):
+            self.write_box(f"{factor}.obj", [factor * side for side in SIDES_M])
+        for file, words, unit, mesh in (
+                (centi, (), "centimetres", "bar.obj"), (milli, (), "millimetres", "bar.obj"),
+                ("fall.csv", ("--unit", "cm"), "metres", "100.obj"),
+                ("fall.csv", ("--unit", "mm"), "metres", "bar.obj")):
+            with self.subTest(file, words=words):
+                done = self.table(file, *out, *words, mesh=mesh, check=False)
+                self.refused("MOTION_UNIT_WRONG", done, f"poses are in {unit},")
+        for factor, act in ((100, lambda: self.table("fall.csv", *out, mesh="0.01.obj", check=False)),
+                            (1000, lambda: self.table("fall.csv", *out, mesh="0.001.obj", check=False)),
+                            (0.01, lambda: self.table("fall.csv", *out, mesh="100.obj", check=False)),
+                            (100, lambda: self.table(centi, *out, "--unit", "cm", check=False))):
+            with self.subTest(factor):
+                self.refused("MOTION_UNIT_WRONG", act(), f" {factor} times as large")
+        done = self.table(centi, *out, "--force", check=False)
+        self.assertRegex(done.stderr, "(?m)^warning: Bar falls at 981 m/s")
+
     def test_list_shows_bodies_and_cameras(self):
         lines = self.foley("fall.glb", "--list").stdout
         for pattern in (r"Bar +free +structural_steel +0\.314 kg +0\.2 x 0\.02 x 0\.01 m +12 triangles, closed",
@@ -319,3 +387,56 @@ class FoleyTest(DaemonTest):
         self.assertLess(found.unexplained, 1e-6)
         with self.assert_refused("MOTION_WITHOUT_CONTACT"):
             self.python_contacts()
+
+
+# A job lasts as long as the folder has the file "slow".
+WORKER = """
+while [ -e "$here/slow" ]; do printf '\\002\\012\\000' >&3; sleep 0.05; done
+exec BIN/carillon-precompute "$@"
+""".replace("BIN", str(BIN))
+
+
+class StoppedTest(ScratchTest):
+    def setUp(self):
+        super().setUp()
+        self.serve("--precompute", scripted.worker(self.folder, WORKER))
+        write_box(self.folder / "bar.obj")
+        write_poses(self.folder / "fall.csv", rows_of_poses())
+        self.fall = ("foley", self.folder / "fall.csv", "--mesh", f"Bar={self.folder / 'bar.obj'}", "--floor", 0,
+                     "--material", "Bar=structural_steel")
+
+    def start(self, *words):
+        """A command that awaits the job of the bar."""
+        process = subprocess.Popen(
+            [BIN / "carillon", "--server", self.daemon.server, *map(str, words)], stderr=subprocess.PIPE, text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        while not process.stderr.readline().startswith("Bar"):
+            self.assertIsNone(process.poll())
+        return process
+
+    def stop(self, process, number):
+        process.send_signal(number)
+        self.assertEqual(process.wait(10), -number)
+
+    def states(self):
+        jobs = self.client.jobs.ListJobs(decomposition_service_pb2.ListJobsRequest()).jobs
+        return [decomposition_pb2.JobState.Name(job.state).removeprefix("JOB_STATE_") for job in jobs]
+
+    def test_a_job_ends_with_the_last_command_that_awaits_it(self):
+        (self.folder / "slow").touch()
+        one, other = (self.start(*self.fall, "--trace", self.folder / f"{k}.contacts") for k in range(2))
+        self.stop(one, signal.SIGINT)
+        self.assertEqual(self.states(), ["RUNNING"])
+        self.stop(other, signal.SIGTERM)
+        wait_until(lambda: self.states() == ["CANCELLED"])
+
+    def test_transfers_that_a_rendering_awaits_end_with_it(self):
+        (self.folder / "traces").mkdir()
+        trace = self.folder / "traces" / "fall.contacts"
+        self.daemon.command(*self.fall, "--trace", trace)
+        (self.folder / "slow").touch()
+        for what, out in ((trace, "fall.wav"), (trace.parent, "clips")):
+            self.stop(self.start("render", what, "--out", self.folder / out, "--wait"), signal.SIGINT)
+            wait_until(lambda: sorted(self.states()) == ["CANCELLED", "SUCCEEDED"])

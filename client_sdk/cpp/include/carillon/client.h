@@ -147,6 +147,10 @@ class Client {
   /// asked for it, too. Further errors: PERMISSION_DENIED (JOB_OF_ANOTHER).
   virtual absl::StatusOr<v1::Job> CancelJob(const std::string& name) const;
 
+  /// Does the same for this client alone: a client with the role administer, as those of a Unix
+  /// socket have, does not cancel the job for the others, either.
+  virtual absl::StatusOr<v1::Job> WithdrawFromJob(const std::string& name) const;
+
   /// Waits until a job ends and returns it if it has succeeded; if it has failed, returns the
   /// error of the decomposition. `on_change` may be null; otherwise it receives the job at once
   /// and after every change.
