@@ -132,7 +132,6 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
                                           ordered.fronts, ordered.matrix, shift, workers, nullptr));
   std::vector<VectorBlockOf<Real>> rough;
   int first_steps = 1;
-  int basis_size = 0;
   {
     const double expected_size = PredictBasisSize(static_cast<int>(wanted));
     LanczosRecurrence<Real> recurrence(ordered.matrix, factor, shift, rigid, expected_size,
@@ -141,16 +140,13 @@ absl::StatusOr<RefinedModes> SolveIn(const OrderedSystem& ordered, const MatrixX
         3 * static_cast<Index>(ordered.matrix.node_count) - rigid.cols(), 10 * wanted + 500);
     ASSIGN_OR_RETURN(const RitzPairs pairs, Iterate(recurrence, wanted, largest, progress));
     rough = recurrence.Combine(pairs.coordinates);
-    basis_size = static_cast<int>(recurrence.size());
     const double error = recurrence.solve_error();
     if (error > 0 && error < kLargeSolveError) first_steps = kFirstSteps;
   }
-  absl::StatusOr<RefinedModes> refined = RefineModes(
+  return RefineModes(
       ordered.matrix, factor, rigid, std::move(rough),
       {.wanted = wanted, .first_steps = first_steps, .free_motion = -kFreeMotion * shift}, workers,
       [&](double done) { progress(kIterationPart + (1 - kIterationPart) * done); });
-  if (refined.ok()) refined->basis_size = basis_size;
-  return refined;
 }
 
 }  // namespace
@@ -175,7 +171,6 @@ absl::StatusOr<Modes> BlockLanczosEigensolver::Solve(const SystemMatrices& syste
   modes.shapes.resize(system.unknown_count(), request.count);
   modes.shapes.leftCols(rigid_.cols()) = rigid_;
   FromNodeOrder(bent->shapes, ordered_, workers, modes.shapes.rightCols(wanted));
-  modes.basis_size = bent->basis_size;
   return modes;
 }
 

@@ -13,7 +13,6 @@ namespace carillon::precompute {
 struct Modes {
   Eigen::VectorXd eigenvalues;  ///< 1/s^2
   Eigen::MatrixXd shapes;       ///< one row for each unknown; phi^T M phi = 1
-  int basis_size = 0;           ///< vectors that block Lanczos built; zero for others
 };
 
 /// A request for the lowest modes of a system, including rigid-body modes.

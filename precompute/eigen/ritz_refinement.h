@@ -27,7 +27,6 @@ struct RefinementPlan {
 struct RefinedModes {
   Eigen::VectorXd eigenvalues;
   VectorBlocks shapes;
-  int basis_size = 0;  ///< vectors of the iteration that the modes come from
 };
 
 /// Refines rough modes, found with a factor in Real, to double precision. Each vector is corrected

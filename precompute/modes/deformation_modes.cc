@@ -152,10 +152,6 @@ class Solution {
     watch_(SolveStage::kVerify, 0);
     DeformationModes result;
     result.predicted_cpu_s = Cost(static_cast<int>(all.shapes.cols())).cpu_seconds();
-    result.work = {.factor_multiply_adds = ordered_.fronts.factor_flops,
-                   .factor_entries = static_cast<double>(FactorNumbers(ordered_.fronts)),
-                   .unknowns = static_cast<double>(system_.unknown_count()),
-                   .basis_size = all.basis_size};
     const Measurement measured = Measure(ordered_.matrix, ordered_.fronts.order, all, workers_);
     result.verification.max_orthogonality_error = OrthogonalityError(measured.gram);
     std::vector<Eigen::Index> kept;

@@ -17,14 +17,6 @@
 
 namespace carillon::precompute {
 
-/// The size of a solution, from which a benchmark computes the least time that a machine needs.
-struct SolveWork {
-  double factor_multiply_adds = 0;  ///< of one factorization
-  double factor_entries = 0;
-  double unknowns = 0;
-  int basis_size = 0;  ///< vectors that block Lanczos built; zero for the dense solver
-};
-
 /// All verified deformation modes of a body below an eigenvalue. Its rigid-body modes (six, or
 /// fewer for a fixed body) are left to the simulator.
 struct DeformationModes {
@@ -41,7 +33,6 @@ struct DeformationModes {
   Modes above;
   /// Processor time, s, that PredictSolveCost() predicts for the modes found.
   double predicted_cpu_s = 0;
-  SolveWork work;
 };
 
 /// The stages of a solution. Counting the modes comes first and belongs to kVerify.
