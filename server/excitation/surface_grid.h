@@ -61,7 +61,6 @@ class SurfaceGrid {
 
   /// Returns false if the surface has no cells.
   bool usable() const { return !begins_.empty(); }
-  double cell_width_m() const { return width_m_; }
   /// The longest side of the box around the surface.
   double longest_side_m() const { return longest_side_m_; }
   const Box& box(uint32_t triangle) const { return boxes_[triangle]; }

@@ -14,29 +14,6 @@ namespace {
 
 constexpr int kReadBytes = 2 << 20;
 
-template <typename Record>
-absl::Status ReadDelimited(const std::string& file,
-                           absl::FunctionRef<absl::Status(const Record&)> sink) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(file, " cannot be read; check its name and its permissions"));
-  }
-  google::protobuf::io::FileInputStream in(descriptor, kReadBytes);
-  in.SetCloseOnDelete(true);
-  while (true) {
-    bool at_end = false;
-    Record record;
-    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
-      if (at_end) return absl::OkStatus();
-      return Refusal(
-          absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
-          absl::StrCat(file, " is not a whole file of modal model records; export it again"));
-    }
-    RETURN_IF_ERROR(sink(record));
-  }
-}
-
 }  // namespace
 
 absl::Status NotWritable(const std::string& file) {
@@ -48,12 +25,24 @@ absl::Status NotWritable(const std::string& file) {
 
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink) {
-  return ReadDelimited<v1::ModalModelRecord>(file, sink);
-}
-
-absl::Status ReadTransferRecords(const std::string& file,
-                                 absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink) {
-  return ReadDelimited<v1::TransferRecord>(file, sink);
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                   absl::StrCat(file, " cannot be read; check its name and its permissions"));
+  }
+  google::protobuf::io::FileInputStream in(descriptor, kReadBytes);
+  in.SetCloseOnDelete(true);
+  while (true) {
+    bool at_end = false;
+    v1::ModalModelRecord record;
+    if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&record, &in, &at_end)) {
+      if (at_end) return absl::OkStatus();
+      return Refusal(
+          absl::StatusCode::kInvalidArgument, "MODAL_MODEL_MALFORMED",
+          absl::StrCat(file, " is not a whole file of modal model records; export it again"));
+    }
+    RETURN_IF_ERROR(sink(record));
+  }
 }
 
 }  // namespace carillon::client

@@ -6,7 +6,6 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "carillon/v1/modal_model.pb.h"
-#include "carillon/v1/transfer.pb.h"
 
 namespace carillon::client {
 
@@ -18,9 +17,5 @@ absl::Status NotWritable(const std::string& file);
 /// (MODAL_MODEL_MALFORMED).
 absl::Status ReadRecords(const std::string& file,
                          absl::FunctionRef<absl::Status(const v1::ModalModelRecord&)> sink);
-
-/// Passes the records of a transfer's file to `sink`. The errors are those of ReadRecords.
-absl::Status ReadTransferRecords(const std::string& file,
-                                 absl::FunctionRef<absl::Status(const v1::TransferRecord&)> sink);
 
 }  // namespace carillon::client
