@@ -85,10 +85,11 @@ void TellScenery(const FoleyScene& foley) {
   }
   if (still.empty()) return;
   absl::FPrintF(stderr,
-                "warning: %s never moves, and is silent, though of a material: to hear it, name it "
-                "without a wildcard (--material '%s=%s'), which may take minutes\n",
-                EscapedText(absl::StrJoin(still, ", ")), EscapedText(still.front()),
-                first->scenery);
+                "warning: %s %s silent, though of a material: to hear one, name it without a "
+                "wildcard (--material '%s=%s'), which may take minutes\n",
+                EscapedText(absl::StrJoin(still, ", ")),
+                still.size() == 1 ? "never moves, and is" : "never move, and are",
+                EscapedText(still.front()), first->scenery);
 }
 
 absl::Status CheckSounds(const FoleyScene& foley) {
