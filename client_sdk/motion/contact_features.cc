@@ -35,11 +35,11 @@ void AddCorners(const SurfaceIndex& of, const SurfaceIndex& on, const PairPlacem
     if (!nearest) continue;
     const Vector normal = on_pose.orientation * nearest->normal;
     if (of_is_a) {
-      features.push_back(
-          {kCornerOfA | i, of.corners()[i], nearest->point_m, normal, nearest->gap_m});
+      features.push_back({kCornerOfA | i, of.corners()[i], nearest->point_m, normal, nearest->gap_m,
+                          !of.sharp(i)});
     } else {
-      features.push_back(
-          {kCornerOfB | i, nearest->point_m, of.corners()[i], -normal, nearest->gap_m});
+      features.push_back({kCornerOfB | i, nearest->point_m, of.corners()[i], -normal,
+                          nearest->gap_m, !of.sharp(i)});
     }
   }
 }
@@ -125,7 +125,9 @@ std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceInd
   if (features.empty()) return features;
   if (beyond_m) {
     const double least = std::ranges::min_element(features, {}, &ContactFeature::gap_m)->gap_m;
-    std::erase_if(features, [&](const ContactFeature& f) { return f.gap_m > least + *beyond_m; });
+    std::erase_if(features, [&](const ContactFeature& f) {
+      return f.gap_m > least + (f.round ? *beyond_m : reach_m);
+    });
   }
   KeepSpread(at.a, beyond_m ? kMostFeatures : kMostInStep, features);
   return features;

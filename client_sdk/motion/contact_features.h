@@ -16,6 +16,7 @@ struct ContactFeature {
   Vector point_b = Vector::Zero();  ///< in b's frame
   Vector normal = Vector::Zero();   ///< from b to a, in the scene's axes
   double gap_m = 0;
+  bool round = false;  ///< the corner is one of a round surface
 };
 
 /// Two bodies at an instant, by the poses of their frames.
@@ -24,8 +25,10 @@ struct PairPlacement {
 };
 
 /// Returns the places at which two bodies that lie so may touch: those with a gap within `reach_m`
-/// of zero. If `beyond_m` is given, their gaps exceed the least gap by at most that. If there are
-/// too many for the solver, the ones that are farthest apart are returned.
+/// of zero. If `beyond_m` is given, the gaps of round surfaces exceed the least gap by at most
+/// that, since these surfaces touch where they are nearest, however they turn, and the gaps of
+/// others by at most `reach_m`. If there are too many for the solver, the ones that are farthest
+/// apart are returned.
 std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
                                          const PairPlacement& at, double reach_m,
                                          std::optional<double> beyond_m);

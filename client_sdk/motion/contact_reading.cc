@@ -10,7 +10,7 @@ namespace carillon::motion {
 namespace {
 
 /// A blow has more than this share of the impulse that the load around it gives in a frame,
-constexpr double kShareOfLoad = 0.6;
+constexpr double kShareOfLoad = 0.2;
 /// and changes the relative velocity of the bodies by at least this, m/s.
 constexpr double kLeastSpeed = 0.02;
 /// Impulses that can be divided more evenly by less than this part stay as they are.
@@ -74,7 +74,18 @@ class PairReading {
            kLeastSpeed * pair_.reduced_mass_kg;
   }
 
-  /// Takes pieces of one frame's time together, and keeps as loads those that are small.
+  /// The impulse that the load at a time lacks of the load around it in the time of a frame, N s.
+  double Lacking(double time_s) const {
+    double lacking = 0;
+    for (size_t k = 0; k < forces_.size(); ++k) {
+      const double weight = 1 - std::abs(static_cast<double>(k) - time_s / motion_.frame_s);
+      if (weight > 0) lacking += weight * std::max(0.0, Around(k, 0) - forces_[k]);
+    }
+    return lacking * motion_.frame_s;
+  }
+
+  /// Takes pieces of one frame's time together, and keeps as loads those that are small, or that
+  /// stand for a load which is not there.
   void ReadBlows() {
     for (size_t first = 0; first < pieces_.size();) {
       size_t end = first;
@@ -85,7 +96,7 @@ class PairReading {
       }
       const std::vector<Piece> blow(pieces_.begin() + static_cast<std::ptrdiff_t>(first),
                                     pieces_.begin() + static_cast<std::ptrdiff_t>(end));
-      if (sum > Least(blow.front().candidate->frame, 0)) {
+      if (sum - Lacking(MeanTime(blow)) > Least(blow.front().candidate->frame, 0)) {
         blows_.push_back(blow);
       } else {
         for (const Piece& piece : blow) {

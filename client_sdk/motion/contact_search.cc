@@ -238,9 +238,30 @@ void ContactSearch::Add(Candidate candidate, double time_s, Path path,
   };
   candidate.arm_a = arm(pair.a, candidate.feature.point_a);
   candidate.arm_b = arm(pair.b, candidate.feature.point_b);
+  if (!motion_.frames_are_steps) {
+    const double approach_m = ApproachSpeed(candidate) * motion_.frame_s / bin_count_;
+    candidate.slack_m = std::min(candidate.slack_m, pair.tolerance_m + approach_m);
+  }
+  if (std::abs(candidate.feature.gap_m) > candidate.slack_m) return;
   // A step of a simulator may push several points at once that part after the first push.
   if (candidate.blow() && !motion_.frames_are_steps && IsOfFarSide(candidate)) return;
   out.push_back(candidate);
+}
+
+/// Returns at most how fast the gap of a candidate grows or shrinks, m/s: the greatest mean speed
+/// of the intervals around, and what a fall adds to it within one. Bodies that move together do not
+/// approach each other, however fast they are.
+double ContactSearch::ApproachSpeed(const Candidate& candidate) const {
+  const BodyPair& pair = pairs_[candidate.pair];
+  const size_t last = std::min<size_t>(candidate.frame + 1, frames_ - 2);
+  double speed = 0;
+  for (size_t k = std::max<size_t>(candidate.frame, 1) - 1; k <= last; ++k) {
+    const Vector parting = bodies_.motions[pair.a].MeanVelocity(k, candidate.arm_a) -
+                           bodies_.motions[pair.b].MeanVelocity(k, candidate.arm_b);
+    speed = std::max(speed, std::abs(candidate.feature.normal.dot(parting)));
+  }
+  if (bodies_.motions[pair.a].balanced() == bodies_.motions[pair.b].balanced()) return speed;
+  return speed + std::abs(candidate.feature.normal.dot(motion_.gravity_m_per_s2)) * motion_.frame_s;
 }
 
 /// True if a blow deep inside a body would push against what happens there: the bodies part before
@@ -282,7 +303,6 @@ void ContactSearch::AddLoads(size_t p, const std::vector<PairFrame>& frames,
                           .feature = feature,
                           .slack_m = frames[k].slack_m};
       candidate.feature.gap_m -= pair.offset_m;
-      if (std::abs(candidate.feature.gap_m) > frames[k].slack_m) continue;
       Add(candidate, 0, Path::kBetween, out);
     }
     k = last;
@@ -318,10 +338,7 @@ void ContactSearch::AddBlows(size_t p, const std::vector<PairFrame>& frames, boo
           }
         }
       }
-      for (const auto& [key, found] : best) {
-        if (std::abs(found.first.feature.gap_m) > slack) continue;
-        Add(found.first, bin * bin_s, found.second, out);
-      }
+      for (const auto& [key, found] : best) Add(found.first, bin * bin_s, found.second, out);
     }
   }
 }

@@ -19,7 +19,7 @@ struct Candidate {
   uint32_t last_frame = 0;  ///< a load lasts until here while its bodies are still
   int bin = -1;             ///< a blow comes after bin / bin_count of the interval; -1: a load
   ContactFeature feature;
-  double slack_m = 0;
+  double slack_m = 0;  ///< how large the gap may be
   Vector arm_a = Vector::Zero(),
          arm_b = Vector::Zero();  ///< from the centres of mass, scene's axes
 
@@ -84,6 +84,7 @@ class ContactSearch {
   void AddBlows(size_t pair, const std::vector<PairFrame>& frames, bool known,
                 std::vector<Candidate>& out) const;
   void Add(Candidate candidate, double time_s, Path path, std::vector<Candidate>& out) const;
+  double ApproachSpeed(const Candidate& candidate) const;
   bool IsOfFarSide(const Candidate& candidate) const;
 
   const Motion& motion_;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
 #include <utility>
 
 namespace carillon::motion {
@@ -168,8 +169,8 @@ Vector SurfaceIndex::Tree::NormalAt(uint32_t triangle, const Vector& weights) co
 
 SurfaceIndex::SurfaceIndex(const BodySurface& surface) : tree_(std::make_unique<Tree>(surface)) {
   for (const Vector& vertex : surface.vertices_m) box_.extend(vertex);
-  FindCorners(surface);
   FindEdges(surface);
+  FindCorners(surface);
 }
 
 SurfaceIndex::~SurfaceIndex() = default;
@@ -177,6 +178,11 @@ SurfaceIndex::~SurfaceIndex() = default;
 void SurfaceIndex::FindCorners(const BodySurface& surface) {
   std::vector<bool> stands_out(surface.vertices_m.size(), true);
   std::vector<bool> used(surface.vertices_m.size(), false);
+  const auto less = [](const Vector& one, const Vector& other) {
+    return std::ranges::lexicographical_compare(one, other);
+  };
+  std::set<Vector, decltype(less)> ends(less);
+  for (const SharpEdge& edge : edges_) ends.insert({edge.from_m, edge.to_m});
   for (const auto& t : surface.triangles) {
     for (size_t i = 0; i < 3; ++i) {
       used[t[i]] = true;
@@ -187,7 +193,9 @@ void SurfaceIndex::FindCorners(const BodySurface& surface) {
     }
   }
   for (size_t i = 0; i < used.size(); ++i) {
-    if (used[i] && stands_out[i]) corners_.push_back(surface.vertices_m[i]);
+    if (!used[i] || !stands_out[i]) continue;
+    corners_.push_back(surface.vertices_m[i]);
+    sharp_.push_back(ends.contains(surface.vertices_m[i]));
   }
 }
 

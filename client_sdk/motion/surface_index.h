@@ -37,6 +37,8 @@ class SurfaceIndex {
 
   /// The vertices that stand out from all their neighbours: only they, and sharp edges, touch.
   const std::vector<Vector>& corners() const { return corners_; }
+  /// True if a sharp edge ends at a corner, false if the corner is one of a round surface.
+  bool sharp(size_t corner) const { return sharp_[corner]; }
   const std::vector<SharpEdge>& edges() const { return edges_; }
   const Eigen::AlignedBox3d& box() const { return box_; }
   /// True if each edge has two triangles that run along it in opposite directions.
@@ -49,6 +51,7 @@ class SurfaceIndex {
 
   std::unique_ptr<Tree> tree_;
   std::vector<Vector> corners_;
+  std::vector<bool> sharp_;
   std::vector<SharpEdge> edges_;
   Eigen::AlignedBox3d box_;
   bool closed_ = true;
