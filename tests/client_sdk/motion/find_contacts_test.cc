@@ -241,12 +241,12 @@ TEST(FindContacts, FindsMostOfPilesAtSixtyFramesAndCallsThemAmbiguous) {
     const Likeness is = Compare(fall, found);
     found_share += is.found_share / kPiles;
     false_share += is.false_share / kPiles;
-    EXPECT_LT(found.confidence.unexplained, i == 0 ? 0.001 : 0.005) << i;
+    EXPECT_LT(found.confidence.unexplained, 0.001) << i;
     EXPECT_GT(found.confidence.ambiguity, 0.3) << i;
     ExpectOneUnit(fall.motion, found);
   }
-  EXPECT_GE(found_share, 0.8);
-  EXPECT_LE(false_share, 0.15);
+  EXPECT_GE(found_share, 0.86);
+  EXPECT_LE(false_share, 0.1);
 }
 
 TEST(FindContacts, FindsEqualAndOppositeImpulsesInTheAir) {
