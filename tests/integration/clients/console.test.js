@@ -365,7 +365,9 @@ test('in Chromium a mesh becomes a model that is seen, struck and heard', { time
   await page.locator('.body').focus();
   const places = [];
   for (const keys of ['Shift+ArrowRight', 'Shift+ArrowRight', 'Control+Shift+ArrowRight']) {
+    await page.evaluate(() => { globalThis.former = carillonConsole.state.strike.value; });
     await page.keyboard.press(keys);
+    await page.waitForFunction(() => carillonConsole.state.strike.value !== former);
     places.push(await page.evaluate(() => carillonConsole.state.strike.value.point));
   }
   const [coarse, fine] = [1, 2].map((i) => Math.hypot(...places[i].map((coordinate, axis) => coordinate - places[i - 1][axis])));

@@ -156,6 +156,8 @@ let scene = '';
 let object = '';
 let handle = 0;
 let strikes: StrikeStream | undefined;
+/** The newest strike on a scene that does not have its object yet. */
+let waiting: Strike | undefined;
 let updating: Promise<void> | undefined;
 let updateAgain = false;
 
@@ -203,11 +205,14 @@ async function begin(): Promise<void> {
       takeMaterials((await services.models.listMaterials({})).materials);
       if (!materials.value.some(({ name }) => name === newMaterial.value)) newMaterial.value = 'structural_steel';
       await listModels();
+      strikes = undefined;
       scene = (await services.scenes.createScene({})).name;
       object = '';
-      strikes = new StrikeStream(services, scene, (message) => { fault.value = { message }; }, () => void begin());
       if (model.value) await addObject(model.value);
       else if (models.value[0] && !upload.value) await openModel(models.value[0].name);
+      strikes = new StrikeStream(services, scene, (message) => { fault.value = { message }; }, () => void begin());
+      if (waiting) sendStrike(waiting);
+      waiting = undefined;
       // The daemon may have gone between a strike and its answer.
       if (strike.value && !row.value) await readRow(strike.value);
       return true;
@@ -322,6 +327,7 @@ export function updateObject(): Promise<void> {
 
 /** Sends a strike at once. What the picture and the spectrum need follows it. */
 export function sendStrike(at: Strike): void {
+  if (!strikes) waiting = at;
   strikes?.send(handle, at.point.map((coordinate) => coordinate * size.value) as Triple, force(at), striker.value);
 }
 
