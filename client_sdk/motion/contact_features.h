@@ -24,11 +24,11 @@ struct PairPlacement {
   BodyPose a, b;
 };
 
-/// Returns the places at which two bodies that lie so may touch: those with a gap within `reach_m`
-/// of zero. If `beyond_m` is given, the gaps of round surfaces exceed the least gap by at most
-/// that, since these surfaces touch where they are nearest, however they turn, and the gaps of
-/// others by at most `reach_m`. If there are too many for the solver, the ones that are farthest
-/// apart are returned.
+/// Returns the places at which two bodies that lie so may touch: their gaps are at most `reach_m`.
+/// If `beyond_m` is given, the gaps of round surfaces exceed the least gap by at most `beyond_m`,
+/// since round surfaces touch where they are nearest, however they turn; the gaps of other surfaces
+/// exceed it by at most `reach_m`. If there are too many places for the solver, those that are
+/// farthest apart are returned.
 std::vector<ContactFeature> FindFeatures(const SurfaceIndex& a, const SurfaceIndex& b,
                                          const PairPlacement& at, double reach_m,
                                          std::optional<double> beyond_m);

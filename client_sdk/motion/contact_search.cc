@@ -248,9 +248,9 @@ void ContactSearch::Add(Candidate candidate, double time_s, Path path,
   out.push_back(candidate);
 }
 
-/// Returns at most how fast the gap of a candidate grows or shrinks, m/s: the greatest mean speed
-/// of the intervals around, and what a fall adds to it within one. Bodies that move together do not
-/// approach each other, however fast they are.
+/// Returns a bound on how fast the gap of a candidate grows or shrinks, m/s: the greatest of the
+/// mean speeds of the intervals around it, plus the speed that gravity adds within one interval.
+/// Bodies that move together do not approach each other, however fast they are.
 double ContactSearch::ApproachSpeed(const Candidate& candidate) const {
   const BodyPair& pair = pairs_[candidate.pair];
   const size_t last = std::min<size_t>(candidate.frame + 1, frames_ - 2);

@@ -168,7 +168,7 @@ void SetSunk(const Motion& motion, const SearchBodies& bodies, Confidence& confi
       const double depth_m = -std::min(Distance(motion, bodies, body, other, frame, 0),
                                        Distance(motion, bodies, other, body, frame, 0));
       const double part = depth_m / std::min(half_m(body), half_m(other));
-      // What is wholly inside, as in a room that is drawn as a solid, is there on purpose.
+      // A body is wholly inside another on purpose, as in a room that is drawn as a solid.
       if (part <= confidence.sunk_part || depth_m > 2 * moves.radius_m()) continue;
       confidence.sunk_part = part;
       confidence.sunk_m = depth_m;

@@ -158,7 +158,7 @@ struct BarModes {
 };
 
 constexpr double kLength = 0.3;
-constexpr double kSide = 0.02;  // of the square bars
+constexpr double kSide = 0.02;  // the side of the square section
 
 /// The n-th longitudinal mode, Hz, lowered by the inertia of the section's breathing (Rayleigh and
 /// Love).

@@ -194,13 +194,15 @@ absl::Status Judge(const FoleyScene& foley, const motion::FoundContacts& found, 
                   "have acted at another corner or in the next frame%s\n",
                   100 * is.ambiguity, motion.frames_are_steps ? "" : "; more frames a second tell");
   }
+  const auto warn_of_depth = [&](size_t a, size_t b, double depth_m, const char* when) {
+    absl::FPrintF(stderr,
+                  "warning: %s is up to %.3g m inside of %s %s: is the height of the floor "
+                  "(--floor), the unit (--unit) or a mesh (--mesh) wrong?\n",
+                  EscapedText(motion.bodies[a].name), depth_m, EscapedText(motion.bodies[b].name),
+                  when);
+  };
   if (is.deepest_part > kDeep) {
-    absl::FPrintF(
-        stderr,
-        "warning: %s is up to %.3g m inside of %s where they strike: is the height of the "
-        "floor (--floor), the unit (--unit) or a mesh (--mesh) wrong?\n",
-        EscapedText(motion.bodies[is.deepest_a].name), is.deepest_m,
-        EscapedText(motion.bodies[is.deepest_b].name));
+    warn_of_depth(is.deepest_a, is.deepest_b, is.deepest_m, "where they strike");
   }
   if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
     absl::FPrintF(stderr,
@@ -209,12 +211,7 @@ absl::Status Judge(const FoleyScene& foley, const motion::FoundContacts& found, 
                   100 * is.unexplained, EscapedText(where));
   }
   if (is.sunk_part > kSunk) {
-    absl::FPrintF(
-        stderr,
-        "warning: %s is up to %.3g m inside of %s while it falls freely: is the height of "
-        "the floor (--floor), the unit (--unit) or a mesh (--mesh) wrong?\n",
-        EscapedText(motion.bodies[is.sunk_a].name), is.sunk_m,
-        EscapedText(motion.bodies[is.sunk_b].name));
+    warn_of_depth(is.sunk_a, is.sunk_b, is.sunk_m, "while it falls freely");
   }
   if (force) return absl::OkStatus();
   const bool nothing = found.blows.empty() && found.loads.empty();

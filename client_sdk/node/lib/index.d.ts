@@ -83,7 +83,7 @@ export class Performance {
   remove(object: number, environments?: number | Iterable<number>): void;
   /** Silence at once, and time zero. */
   reset(environments?: number | Iterable<number>): void;
-  /** Performs a step. Samples are [environment][channel][frame]. Throws CarillonError if a part is rejected. */
+  /** Performs a step. Samples are [environment][channel][frame]. Throws CarillonError if a part of it is rejected. */
   step(content?: {
     contacts?: OfEnvironments<Contacts>; impacts?: OfEnvironments<Impacts>; forces?: OfEnvironments<ContactForces>;
     poses?: OfEnvironments<NonNullable<StepContent['poses']>>;
@@ -330,7 +330,7 @@ export class Client {
   /** Yields the jobs that wait or run, then null, and then each job that matches after every change. */
   watchJobs(filters?: JobFilters): AsyncGenerator<Job__Output | null>;
   scenes(): Promise<Scene[]>;
-  /** Renders a trace or a .contacts file. Throws CarillonError if a part is rejected. */
+  /** Renders a trace or a .contacts file. Throws CarillonError if a contact is rejected. */
   render(trace: Trace | string, settings?: RenderSettings): Promise<Sound>;
   /** Begins environments whose sound comes in step with their simulation. `step` is in seconds. */
   perform(settings: {

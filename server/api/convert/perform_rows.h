@@ -16,7 +16,7 @@
 
 namespace carillon {
 
-/// What of a step could not be done, by environment.
+/// The parts of a step that could not be done, by environment.
 class StepRejections {
  public:
   struct Rejection {
@@ -34,7 +34,7 @@ class StepRejections {
     strays_.clear();
   }
 
-  /// Rejects in the intake of an environment what was of that environment.
+  /// Counts the rejected parts of an environment in the environment's intake.
   void Tell(size_t environment, ContactIntake& intake) const;
   std::span<const Rejection> strays() const { return strays_; }
   /// Returns why something was rejected, or OK if nothing was.

@@ -60,9 +60,10 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   absl::Status Take(const v1::PerformRequest& request) override {
     if (request.has_settings()) return Begin(request.settings());
     if (performance_ == nullptr) return Malformed("the first request has no settings");
-    if (request.has_reset()) return Reset(request.reset());
     if (request.has_step()) return Step(request.step());
-    return Malformed("a request has neither settings, reset nor step");
+    if (!request.has_reset()) return Malformed("a request has neither settings, reset nor step");
+    Reset(request.reset());
+    return absl::OkStatus();
   }
 
   absl::Status AllRead() override {
@@ -131,12 +132,11 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
     return GrowMemory();
   }
 
-  absl::Status Reset(const v1::PerformReset& reset) {
+  void Reset(const v1::PerformReset& reset) {
     ForEach(reset.environments(), [this](Environment& environment) {
       NoteWarnings(environment);
       return environment.Reset();
     });
-    return absl::OkStatus();
   }
 
   /// Keeps the warnings about the contacts since the last reset. Of several with the same id the
@@ -256,7 +256,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   bool ended_ = false;
   StepRejections rejections_;          // since the last step
   std::vector<uint64_t> told_counts_;  // rejections of each environment
-  uint64_t rejected_count_ = 0;        // of all environments, and of none
+  uint64_t rejected_count_ = 0;        // of all environments, and of unknown ones
   absl::Status last_rejection_;
   std::map<std::string, v1::Warning> warnings_;  // by id
   std::span<const float> samples_;               // that the newest step rendered

@@ -185,7 +185,8 @@ TEST(ShootMomentum, FindsTheTurnOfASlenderBody) {
   }
 }
 
-/// What is computed by an engine looks like no mistake of units, by the limits of `carillon foley`.
+/// Expects that a motion of an engine is not taken for one in another unit of length, by the limits
+/// of `carillon foley`.
 void ExpectOneUnit(const Motion& motion, const FoundContacts& found) {
   EXPECT_EQ(FindLengthMistake(motion).factor, 1);
   EXPECT_LT(found.confidence.sunk_part, 0.1);

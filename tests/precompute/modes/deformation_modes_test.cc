@@ -190,7 +190,7 @@ TEST(LargestThat, IsTheLeastWhereNoneFits) {
 
 constexpr Point kSize{1, 0.6, 0.3};
 
-/// What is fixed of a box, and how many motions are left.
+/// The fixed nodes of a box, and the number of rigid motions that are left.
 struct Holding {
   const char* name;
   std::vector<Fixture> fixtures;
@@ -298,7 +298,7 @@ TEST(FixedBody, RigidBodyModesLeaveWhatIsFixedWhereItIsAndBendNothing) {
         RigidBodyModes(PlacesOf(moving, mesh), system, PlacesOf(mesh.fixed, mesh));
     ASSERT_EQ(rigid.cols(), holding.rigid_mode_count) << holding.name;
     if (rigid.cols() == 0) continue;
-    // The energy of the free body, so that the motion of what is fixed would count.
+    // The energy is that of the free body, in which a motion of fixed nodes would count.
     TetMesh free = mesh;
     free.fixed.clear();
     const SystemMatrices whole = Assemble(free, kUnitElastic, 1, MassSharing::kConsistent);

@@ -33,7 +33,7 @@ class Performance {
   /// latency in frames.
   virtual const v1::PerformanceBegun& begun() const = 0;
 
-  /// Performs a step of all environments. What is rejected of a step is no error: see
+  /// Performs a step of all environments. A rejected part of a step is no error: see
   /// PerformedStep::findings. After an error the performance has ended.
   virtual absl::StatusOr<PerformedStep> Step(const v1::PerformStep& step) = 0;
 
