@@ -34,6 +34,10 @@ void LoadTracker::ForgetBlows() {
   blows_newtons_ = {};
 }
 
+bool LoadTracker::has_blows() const {
+  return std::ranges::any_of(blows_newtons_, [](double blow) { return blow > 0; });
+}
+
 bool LoadTracker::idle() const { return empty_count_ >= kStepCount; }
 
 double LoadTracker::Usual() const {

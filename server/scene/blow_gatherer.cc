@@ -6,8 +6,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
+#include <limits>
+#include <map>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "server/synthesis/voice/vector3.h"
 
@@ -38,6 +42,11 @@ constexpr double kRounding = 1e-9;
 /// The speed of a blow, as a part of J/m, lies between these limits, because J is (1 + e) m v with
 /// a restitution e of 0 to 1. The limits leave room for engines whose masses differ a little.
 constexpr double kLeastOfSpeed = 0.4, kMostOfSpeed = 2;
+/// Contacts within this part of a body's extent are at one place.
+constexpr double kReach = 1.0 / 8;
+/// A place strikes with others in a step in which it gets at least this part of its greatest
+/// impulse.
+constexpr double kTogether = 0.5;
 /// A contact that is lost for a shorter time than this flickers, seconds.
 constexpr double kLostS = 0.01;
 /// A load continues with another partner if the cosine of its change of direction is greater than
@@ -125,6 +134,7 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
   if (!std::ranges::binary_search(pairs_, bodies, {}, &Pair::bodies)) new_pairs_.insert(bodies);
   PairTouch& added = touches_.emplace_back();
   added.bodies = bodies;
+  added.reach_m = std::numeric_limits<double>::infinity();
   for (const BodyImpulse& on_body : impulse.all()) {
     added.parts[added.part_count++] = {.handle = on_body.handle,
                                        .mass_kg = on_body.mass_kg,
@@ -133,6 +143,7 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
                                        .point_m = on_body.point_m,
                                        .turn = on_body.turn,
                                        .collision = on_body.collision};
+    added.reach_m = std::min(added.reach_m, kReach * on_body.extent_m);
   }
   added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
   added.roughness = touch.roughness;
@@ -331,17 +342,19 @@ void BlowGatherer::Divide(Pair& pair) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) impulse += touch.magnitude;
   const double force = impulse / step_s_;
+  const bool elsewhere = pair.load.has_blows() && StrikesElsewhere(pair);
+  if (elsewhere) pair.load.ForgetBlows();
   // The part of the impulse that exceeds the load, 0 to 1.
   const double share_of_new_blow = pair.load.Next(impulse, step_s_);
   double share = share_of_new_blow;
   if (pair.blow.begun()) {
     share = force > 0 ? std::max(1 - pair.blow.load_newtons / force, 0.0) : 0;
   }
-  const bool undecided = pair.blow.begun() && *time_s_ - pair.blow.begin_s >= kUndecidedS;
+  const bool undecided = pair.blow.begun() && *time_s_ - pair.blow.begin_s() >= kUndecidedS;
   double remains = 0;
   Blow& blow = pair.blow;
   if (Flickers(blow, force)) share = IsFeeble(pair) ? 0 : share_of_new_blow;
-  if (blow.begun() && IsOver(blow, force, share * impulse, remains)) {
+  if (blow.begun() && IsOver(blow, force, share * impulse, elsewhere, remains)) {
     if (HasLasted(blow) && ImpulseAbove(blow, remains) <= kSettling * remains * step_s_) {
       CountAsLoad(blow);
     } else {
@@ -370,7 +383,9 @@ void BlowGatherer::Divide(Pair& pair) {
 }
 
 void BlowGatherer::CountAsLoad(Blow& blow) {
-  counts_.load_count += blow.steps.size() * blow.touches.size();
+  for (const Stroke& stroke : blow.strokes) {
+    counts_.load_count += blow.steps.size() * stroke.touches.size();
+  }
   blow.steps.clear();
 }
 
@@ -403,38 +418,96 @@ double BlowGatherer::ApproachSpeed(std::span<const PairTouch> touches) const {
   return weights > 0 ? std::max(sum / weights, 0.0) : 0;
 }
 
-void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) const {
+void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
   Blow& blow = pair.blow;
   if (!blow.begun()) {
-    blow.begin_s = *time_s_;
-    blow.approach_m_per_s = ApproachSpeed(pair.touches);
-    blow.lasting = pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS;
-    blow.strongest = 0;
-    blow.touches.clear();
+    blow.lasting =
+        pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS && !StrikesElsewhere(pair);
+    blow.greatest = 0;
+    blow.strokes.clear();
   }
-  const bool is_strongest = impulse > blow.greatest();
-  blow.steps.push_back({.impulse = impulse, .force = force_newtons});
-  if (!is_strongest) return;
-  blow.strongest = blow.steps.size() - 1;
-  blow.touches.assign(pair.touches.begin(), pair.touches.end());
+  blow.steps.push_back({.impulse = impulse, .force = force_newtons, .time_s = *time_s_});
+  blow.greatest = std::max(blow.greatest, impulse);
+  AddToStrokes(blow, pair.touches, impulse / (force_newtons * step_s_));
 }
 
-bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse,
+void BlowGatherer::AddToStrokes(Blow& blow, std::span<const PairTouch> touches,
+                                double share) const {
+  const size_t step = blow.steps.size() - 1;
+  const size_t known_count = blow.strokes.size();
+  std::vector<std::vector<PairTouch>> by_stroke(known_count);
+  for (const PairTouch& touch : touches) {
+    const auto found = std::ranges::find_if(blow.strokes, [&touch](const Stroke& stroke) {
+      return IsAtOnePlace(stroke.latest, touch);
+    });
+    const auto at = static_cast<size_t>(found - blow.strokes.begin());
+    if (found == blow.strokes.end()) {
+      blow.strokes.push_back({.latest = touch});
+      by_stroke.emplace_back();
+    }
+    blow.strokes[at].impulses.resize(step + 1);
+    blow.strokes[at].impulses[step] += share * touch.magnitude;
+    by_stroke[at].push_back(touch);
+  }
+  std::vector<PairTouch> begin;
+  for (size_t at = 0; at < by_stroke.size(); ++at) {
+    Stroke& stroke = blow.strokes[at];
+    if (by_stroke[at].empty()) continue;
+    if (at >= known_count) std::ranges::copy(by_stroke[at], std::back_inserter(begin));
+    stroke.latest = by_stroke[at].front();
+    if (!stroke.touches.empty() && stroke.impulses[step] <= stroke.greatest()) continue;
+    stroke.strongest = step;
+    stroke.touches = std::move(by_stroke[at]);
+  }
+  if (begin.empty()) return;
+  const double approach_m_per_s = ApproachSpeed(begin);
+  for (Stroke& stroke : std::span(blow.strokes).subspan(known_count)) {
+    stroke.approach_m_per_s = approach_m_per_s;
+  }
+}
+
+bool BlowGatherer::IsAtOnePlace(const PairTouch& one, const PairTouch& other) {
+  for (const Part& part : one.all()) {
+    for (const Part& same : other.all()) {
+      if (part.handle != same.handle) continue;
+      const Vector3 apart{part.point_m[0] - same.point_m[0], part.point_m[1] - same.point_m[1],
+                          part.point_m[2] - same.point_m[2]};
+      const double reach_m = std::min(one.reach_m, other.reach_m);
+      if (Dot(apart, apart) <= reach_m * reach_m) return true;
+    }
+  }
+  return false;
+}
+
+bool BlowGatherer::StrikesElsewhere(const Pair& pair) {
+  if (pair.blow.strokes.empty() || IsFeeble(pair)) return false;
+  double known = 0, all = 0;
+  for (const PairTouch& touch : pair.touches) {
+    all += touch.magnitude;
+    const auto is_near = [&touch](const Stroke& stroke) {
+      return IsAtOnePlace(stroke.latest, touch);
+    };
+    if (std::ranges::any_of(pair.blow.strokes, is_near)) known += touch.magnitude;
+  }
+  return known < all / 2;
+}
+
+bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse, bool elsewhere,
                           double& remains) const {
   if (blow.lost_steps > 0) return blow.lost_steps > MostLostSteps();
-  if (impulse <= blow.greatest() / 4) return true;
+  if (impulse <= blow.greatest / 4) return !elsewhere;
   if (HasLasted(blow)) {
     remains = MeanForceOfLastHalf(blow);
     return true;
   }
   remains = force_newtons;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
-  if (impulse > blow.greatest() / 2 || blow.steps.size() < steps + 1) return false;
+  if (impulse > blow.greatest / 2 || blow.steps.size() < steps + 1) return false;
   return force_newtons >= 0.75 * blow.steps[blow.steps.size() - steps].force;
 }
 
 bool BlowGatherer::HasLasted(const Blow& blow) const {
-  return *time_s_ - blow.begin_s >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps;
+  return *time_s_ - blow.begin_s() >= kLongestBlowS && blow.steps.size() >= kMostBlowSteps;
 }
 
 double BlowGatherer::MeanForceOfLastHalf(const Blow& blow) {
@@ -453,71 +526,99 @@ double BlowGatherer::ImpulseAbove(const Blow& blow, double load_newtons) const {
 
 void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   Blow& blow = pair.blow;
-  const double impulse = ImpulseAbove(blow, remains_newtons);
-  if (!(impulse > kRounding * ImpulseAbove(blow, 0))) return CountAsLoad(blow);
-  blow.steps.clear();
-  ++counts_.blow_count;
-  double whole = 0, squares = 0;
-  for (const auto& [place, magnitude] : MagnitudesByPlace(blow.touches)) {
-    whole += magnitude;
-    squares += magnitude * magnitude;
+  const double above_load = ImpulseAbove(blow, 0);
+  const double share = ImpulseAbove(blow, remains_newtons) / above_load;
+  if (!(share > kRounding)) return CountAsLoad(blow);
+  const std::vector<Impact> impacts = ImpactsOf(blow, share);
+  const double first_s = blow.steps[impacts.front().step].time_s;
+  for (const Impact& impact : impacts) {
+    SendImpact(pair, impact, blow.steps[impact.step].time_s - first_s);
   }
-  const Collision collision = CollisionOf(blow, impulse);
-  for (const PairTouch& touch : blow.touches) {
-    const BlowShares shares{.scale = impulse / whole,
-                            .of_blow = touch.magnitude / whole,
+  blow.steps.clear();
+}
+
+std::vector<BlowGatherer::Impact> BlowGatherer::ImpactsOf(const Blow& blow, double share) {
+  std::vector<const Stroke*> left;
+  for (const Stroke& stroke : blow.strokes) left.push_back(&stroke);
+  std::vector<Impact> impacts;
+  while (!left.empty()) {
+    const Stroke& strongest = **std::ranges::max_element(left, {}, &Stroke::greatest);
+    Impact impact{.step = strongest.strongest};
+    std::erase_if(left, [&](const Stroke* stroke) {
+      if (stroke->impulse_in(impact.step) < kTogether * stroke->greatest()) return false;
+      if (impact.strikes.empty()) impact.approach_m_per_s = stroke->approach_m_per_s;
+      double of_place = 0, of_touches = 0;
+      for (const double of_step : stroke->impulses) of_place += share * of_step;
+      for (const PairTouch& touch : stroke->touches) of_touches += touch.magnitude;
+      for (const PairTouch& touch : stroke->touches) {
+        impact.strikes.push_back({.touch = &touch, .scale = of_place / of_touches});
+      }
+      return true;
+    });
+    impacts.push_back(std::move(impact));
+  }
+  std::ranges::sort(impacts, {}, &Impact::step);
+  return impacts;
+}
+
+void BlowGatherer::SendImpact(const Pair& pair, const Impact& impact, double later_s) {
+  ++counts_.blow_count;
+  std::map<uint32_t, double> by_vertex;
+  double whole = 0, squares = 0;
+  for (const Strike& strike : impact.strikes) {
+    by_vertex[VertexOf(*strike.touch)] += strike.impulse();
+    whole += strike.impulse();
+  }
+  for (const auto& [vertex, impulse] : by_vertex) squares += impulse * impulse;
+  const Collision collision = CollisionOf(impact, whole);
+  for (const Strike& strike : impact.strikes) {
+    const BlowShares shares{.scale = strike.scale,
+                            .of_blow = strike.impulse() / whole,
                             .of_mass = squares / (whole * whole),
                             .mass_kg = collision.reduced_mass_kg,
                             .speed_m_per_s = collision.stated_speed_m_per_s};
-    for (size_t i = 0; i < touch.part_count; ++i) {
-      events_.push_back(PartOfBlow(touch, i, shares));
-      events_.back().time_s = TimeOf(pair.bodies, blow, touch);
+    for (size_t i = 0; i < strike.touch->part_count; ++i) {
+      events_.push_back(PartOfBlow(*strike.touch, i, shares));
+      events_.back().time_s = TimeOf(pair.bodies, pair.blow, *strike.touch) + later_s;
     }
   }
 }
 
-Collision BlowGatherer::CollisionOf(const Blow& blow, double impulse) {
-  const PairTouch& first = blow.touches.front();
-  double whole = 0, masses = 0;
-  for (const PairTouch& touch : blow.touches) {
-    whole += touch.magnitude;
-    masses += touch.magnitude * touch.parts[0].collision.reduced_mass_kg;
+Collision BlowGatherer::CollisionOf(const Impact& impact, double impulse) {
+  const PairTouch& first = *impact.strikes.front().touch;
+  double masses = 0;
+  for (const Strike& strike : impact.strikes) {
+    masses += strike.impulse() * strike.touch->parts[0].collision.reduced_mass_kg;
   }
   double per_kg = first.striker_per_kg.value_or(0);
   for (size_t i = 0; i < first.part_count; ++i) {
     Vector3 push{}, turn{};
-    for (const PairTouch& touch : blow.touches) {
+    for (const auto& [touch, scale] : impact.strikes) {
       for (size_t axis = 0; axis < push.size(); ++axis) {
-        push[axis] += double{touch.parts[i].impulse.impulse_newton_seconds[axis]};
-        turn[axis] += touch.parts[i].turn[axis];
+        push[axis] += scale * double{touch->parts[i].impulse.impulse_newton_seconds[axis]};
+        turn[axis] += scale * touch->parts[i].turn[axis];
       }
     }
     const double mass = first.parts[i].mass_kg;
-    const double moved_per_kg = (Dot(push, push) / mass + Dot(turn, turn)) / (whole * whole);
+    const double moved_per_kg = (Dot(push, push) / mass + Dot(turn, turn)) / (impulse * impulse);
     per_kg += std::max(moved_per_kg, 1 / mass);  // impulses that cancel move nothing
   }
-  const double speed = blow.approach_m_per_s;
+  const double speed = impact.approach_m_per_s;
   if (speed >= kLeastOfSpeed * impulse * per_kg && speed <= kMostOfSpeed * impulse * per_kg) {
     return {.reduced_mass_kg = 1 / per_kg, .stated_speed_m_per_s = speed};
   }
-  return {.reduced_mass_kg = first.striker_per_kg ? 1 / per_kg : masses / whole};
+  return {.reduced_mass_kg = first.striker_per_kg ? 1 / per_kg : masses / impulse};
 }
 
-uint32_t BlowGatherer::PlaceOf(const PairTouch& touch) {
+uint32_t BlowGatherer::VertexOf(const PairTouch& touch) {
   const SurfaceImpulse& impulse = touch.parts[0].impulse;
   const auto nearest = std::ranges::max_element(impulse.at.weights) - impulse.at.weights.begin();
   return impulse.at.vertices[static_cast<size_t>(nearest)];
 }
 
-std::map<uint32_t, double> BlowGatherer::MagnitudesByPlace(std::span<const PairTouch> touches) {
-  std::map<uint32_t, double> magnitudes;
-  for (const PairTouch& touch : touches) magnitudes[PlaceOf(touch)] += touch.magnitude;
-  return magnitudes;
-}
-
 double BlowGatherer::TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const {
   if (!blow.lasting || touch.time_offset_s > 0) return *time_s_ + touch.time_offset_s;
-  return *time_s_ + Share(blow.begin_s, bodies.first, bodies.second) * step_s_;
+  return *time_s_ + Share(blow.begin_s(), bodies.first, bodies.second) * step_s_;
 }
 
 /// Returns the impulse on the first or the second object of a touch.

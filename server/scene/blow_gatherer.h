@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -59,6 +58,13 @@ struct ForceEvent {
 /// and slides must be heard. If the contact does not slide, the force is below the body's modes and
 /// silent.
 ///
+/// A blow may strike several places: a box that lands rocks from corner to corner. Contacts of
+/// following steps are at one place if they lie within an eighth of the smaller body's extent, in
+/// the frame of either body. Each place gets the impulse of its own contacts. Places whose
+/// impulses are greatest in one step strike together, and those of a later step as much later. A
+/// strong impulse at a place that the last blow did not touch is no part of that blow's end, and
+/// the force of that blow does not count as its load.
+///
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.
 ///
@@ -87,7 +93,7 @@ struct ForceEvent {
 /// within one step after the step in which it is over. The time is uniformly distributed, so that
 /// the mean spectrum of such blows has no lines. The time is a function of the simulation time and
 /// of the two bodies, so that the same simulation gives the same events. The first blow after a
-/// flight, and contacts with a time offset of their own, have exact times.
+/// flight or at another place, and contacts with a time offset of their own, have exact times.
 class BlowGatherer {
  public:
   /// Events, valid until the next call of a function that returns events.
@@ -159,6 +165,7 @@ class BlowGatherer {
     std::array<Part, 2> parts{};
     size_t part_count = 0;
     double magnitude = 0;  // of the first object's impulse, N s
+    double reach_m = 0;    // how far apart contacts at one place may be
     Roughness roughness;
     double time_offset_s = 0;
     bool duration_follows_impulse = false;
@@ -167,45 +174,71 @@ class BlowGatherer {
 
     std::span<const Part> all() const { return std::span(parts).first(part_count); }
   };
-  /// What a touch has of its blow.
+  /// What a touch has of its impact.
   struct BlowShares {
-    double scale = 1;    ///< impulse that the blow gives the touch, over that of its strongest step
-    double of_blow = 1;  ///< the part of the touch in the blow's impulse
-    double of_mass = 1;  ///< the part of the mass that a place brings to rest, by its impulse
-    double mass_kg = 0;  ///< as in Collision, of the whole blow
+    double scale = 1;          ///< as in Strike
+    double of_blow = 1;        ///< the part of the touch in the impact's impulse
+    double of_mass = 1;        ///< the part of the mass that a place brings to rest, by its impulse
+    double mass_kg = 0;        ///< as in Collision, of the whole impact
     double speed_m_per_s = 0;  ///< approach speed, or zero: J/(2 m)
   };
   static ForceEvent PartOfBlow(const PairTouch& touch, size_t which, const BlowShares& shares);
-  /// Returns the vertex nearest to a touch. Touches with the same one are at the same place.
-  static uint32_t PlaceOf(const PairTouch& touch);
-  static std::map<uint32_t, double> MagnitudesByPlace(std::span<const PairTouch> touches);
+  /// Returns the vertex nearest to a touch. Touches of an impact with the same one are one contact.
+  static uint32_t VertexOf(const PairTouch& touch);
   /// The sum of impulses on an object, N s, in the object's frame.
   struct Motion {
     uint32_t handle = 0;
     double mass_kg = 0;  // zero: there is no such object
     std::array<double, 3> impulse{};
   };
+  /// A place that a blow strikes.
+  struct Stroke {
+    std::vector<double> impulses{};    // above the load in each step of the blow, N s
+    size_t strongest = 0;              // index of the step with the greatest impulse
+    std::vector<PairTouch> touches{};  // touches of that step
+    PairTouch latest{};                // one of the latest step
+    double approach_m_per_s = 0;       // when it began; zero if unknown
+
+    double impulse_in(size_t step) const { return step < impulses.size() ? impulses[step] : 0; }
+    double greatest() const { return impulse_in(strongest); }
+  };
   /// The steps of a blow that is not over yet, or none.
   struct Blow {
     struct Step {
       double impulse = 0;  // above the load, N s
       double force = 0;    // the whole force, newtons
+      double time_s = 0;
     };
-    double load_newtons = 0;      // load before the blow
-    double approach_m_per_s = 0;  // at the places of the first step; zero if unknown
-    double begin_s = 0;
+    double load_newtons = 0;  // load before the blow
+    double greatest = 0;      // impulse of its strongest step, N s
     std::vector<Step> steps{};
-    size_t strongest = 0;              // index of the step with the greatest impulse
-    std::vector<PairTouch> touches{};  // touches of that step
-    bool lasting = false;              // whether the bodies touched shortly before the blow
-    bool feeble = false;               // whether its first step may have been a load
-    int lost_steps = 0;                // steps since a feeble blow lost its contact
+    std::vector<Stroke> strokes{};  // in the order in which they began
+    bool lasting = false;           // whether the bodies touched here shortly before the blow
+    bool feeble = false;            // whether its first step may have been a load
+    int lost_steps = 0;             // steps since a feeble blow lost its contact
 
     bool begun() const { return !steps.empty(); }
-    double greatest() const { return steps.empty() ? 0 : steps[strongest].impulse; }
+    double begin_s() const { return steps.front().time_s; }
   };
-  /// Returns the mass and the speed of the collision that a blow of this impulse, N s, is.
-  static Collision CollisionOf(const Blow& blow, double impulse);
+  /// A touch of a blow, with what all steps gave its place.
+  struct Strike {
+    const PairTouch* touch = nullptr;
+    double scale = 1;  // impulse that the blow gives the touch, over the touch's own
+
+    double impulse() const { return scale * touch->magnitude; }
+  };
+  /// Places of a blow that strike together.
+  struct Impact {
+    size_t step = 0;  // index in the blow's
+    double approach_m_per_s = 0;
+    std::vector<Strike> strikes{};
+  };
+  /// Divides the strokes of a blow, with this share of their impulses, into impacts in order of
+  /// their steps.
+  static std::vector<Impact> ImpactsOf(const Blow& blow, double share);
+  static bool IsAtOnePlace(const PairTouch& one, const PairTouch& other);
+  /// Returns the mass and the speed of the collision that an impact of this impulse, N s, is.
+  static Collision CollisionOf(const Impact& impact, double impulse);
   struct Pair {
     Bodies bodies;
     LoadTracker load{};
@@ -250,10 +283,13 @@ class BlowGatherer {
   double ApproachSpeed(std::span<const PairTouch> touches) const;
   /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
   /// first step.
-  void Gather(Pair& pair, double force_newtons, double impulse) const;
+  void Gather(Pair& pair, double force_newtons, double impulse);
+  /// Adds a step's touches to the strokes of a blow, each with this share of its impulse.
+  void AddToStrokes(Blow& blow, std::span<const PairTouch> touches, double share) const;
   /// Returns whether the blow is over in this step, which has the given force and impulse above the
-  /// load. If a load remains, `remains` is set to its force.
-  bool IsOver(const Blow& blow, double force_newtons, double impulse, double& remains) const;
+  /// load and may strike `elsewhere`. If a load remains, `remains` is set to its force.
+  bool IsOver(const Blow& blow, double force_newtons, double impulse, bool elsewhere,
+              double& remains) const;
   /// Returns whether a blow has lasted as long as one may: what touches then is a load.
   bool HasLasted(const Blow& blow) const;
   static double MeanForceOfLastHalf(const Blow& blow);
@@ -261,6 +297,11 @@ class BlowGatherer {
   double ImpulseAbove(const Blow& blow, double load_newtons) const;
   /// Sends a pair's blow, and ends it.
   void SendBlow(Pair& pair, double remains_newtons);
+  /// Sends an impact, `later_s` after the first one of its blow.
+  void SendImpact(const Pair& pair, const Impact& impact, double later_s);
+  /// Returns whether most of this step's impulse of the pair is where its last blow did not strike,
+  /// and is not feeble.
+  bool StrikesElsewhere(const Pair& pair);
   /// Returns the time of a touch of a blow that is over in this step.
   double TimeOf(const Bodies& bodies, const Blow& blow, const PairTouch& touch) const;
   bool gathers() const;

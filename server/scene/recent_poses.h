@@ -36,8 +36,8 @@ class RecentPoses {
   /// Some engines tell the poses after a step, and others those before it. Therefore the function
   /// takes the faster of two motions, the one to this step's pose and the one to the pose before.
   /// It adds the acceleration of the earlier steps, which is mostly gravity and acts in the step of
-  /// the blow, too. An object keeps its
-  /// pose in a step in which it gets none. One that never had a pose is at rest if another has one.
+  /// the blow, too, unless it is so great that it was another blow. An object keeps its pose in a
+  /// step in which it gets none. One that never had a pose is at rest if another has one.
   std::optional<double> ApproachSpeed(std::span<const Ray> rays) const;
 
  private:

@@ -476,6 +476,100 @@ TEST(BlowGatherer, CornersThatLandTogetherShareTheMassAndHaveOneSpeed) {
   EXPECT_NEAR(DurationS(LandOn({1}).at(0)), 1e-3, 1e-9);
 }
 
+/// An impulse of `newton_seconds` on a body of 1 kg that is 0.5 m long, `along_m` from its end.
+BodyImpulses At(double along_m, double newton_seconds) {
+  BodyImpulses impulses = Landing(newton_seconds, static_cast<uint32_t>(100 * along_m));
+  impulses.by[0].point_m = {along_m, 0, 0};
+  impulses.by[0].extent_m = 0.5;
+  return impulses;
+}
+
+uint32_t VertexOf(const ForceEvent& blow) {
+  return std::get<SurfaceImpulse>(blow.action).at.vertices[1];
+}
+
+TEST(BlowGatherer, CornersThatLandInDifferentStepsStrikeOneByOne) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0, 2400.0}) {
+    for (const double second : {2.0, 7.0, 14.0}) {
+      for (int apart = 1; apart <= 9; ++apart) {
+        const std::vector<ForceEvent> blows = BlowsOf(
+            60,
+            [&](auto& gatherer, int step) {
+              if (step == 40) gatherer.Touch({.contact = {.handle = 3}}, At(0, 10));
+              if (step == 40 + apart) gatherer.Touch({.contact = {.handle = 3}}, At(0.4, second));
+            },
+            1 / rate_hz);
+        SCOPED_TRACE(testing::Message() << rate_hz << " Hz, " << second << ", " << apart);
+        ASSERT_EQ(blows.size(), 2U);
+        EXPECT_EQ(VertexOf(blows[0]), 0U);
+        EXPECT_EQ(VertexOf(blows[1]), 40U);
+        EXPECT_NEAR(*ImpulseOf(blows[0]), 10, 1e-5);
+        EXPECT_NEAR(*ImpulseOf(blows[1]), second, 1e-5);
+        const double later_s = blows[1].time_s - blows[0].time_s;
+        EXPECT_NEAR(later_s, apart / rate_hz, 1e-9);
+      }
+    }
+  }
+}
+
+TEST(BlowGatherer, OfCornersWhoseSoftContactsOverlapEachGetsItsOwnImpulse) {
+  const std::vector<double> half_sine{0.2, 0.5, 0.6, 0.5, 0.2};
+  const std::vector<ForceEvent> blows = BlowsOf(
+      60,
+      [&](auto& gatherer, int step) {
+        for (const auto& [along_m, begin] : {std::pair(0.0, 20), {0.4, 23}}) {
+          if (step < begin || step >= begin + 5) continue;
+          const double newton_seconds = half_sine[static_cast<size_t>(step - begin)];
+          gatherer.Touch({.contact = {.handle = 3}}, At(along_m, newton_seconds));
+        }
+      },
+      0.001);
+  ASSERT_EQ(blows.size(), 2U);
+  EXPECT_EQ(VertexOf(blows[1]), 40U);
+  for (const ForceEvent& blow : blows) EXPECT_NEAR(*ImpulseOf(blow), 2, 0.21);
+  EXPECT_NEAR(blows[1].time_s - blows[0].time_s, 0.003, 1e-9);
+}
+
+TEST(BlowGatherer, ACornerThatSlidesDuringABlowStrikesOnce) {
+  const std::vector<ForceEvent> blows = BlowsOf(40, [](auto& gatherer, int step) {
+    if (step < 20 || step >= 28) return;
+    gatherer.Touch({.contact = {.handle = 3}}, At(0.05 * (step - 20), 0.25));
+  });
+  ASSERT_EQ(blows.size(), 1U);
+  EXPECT_NEAR(*ImpulseOf(blows[0]), 2, 1e-6);
+}
+
+TEST(BlowGatherer, ACornerThatSlidesFastOverAnotherBodyStrikesOnceAndOneThatRocksOnItTwice) {
+  const auto land = [](double on_die_m, double on_table_m) {
+    return BlowsOf(40, [=](auto& gatherer, int step) {
+      if (step != 20 && step != 21) return;
+      BodyImpulses impulses = At(step == 20 ? 0.0 : on_table_m, 1);
+      impulses.by[1] = impulses.by[0];
+      impulses.by[1].handle = 4;
+      impulses.by[1].extent_m = 0.02;
+      impulses.by[1].point_m = {step == 20 ? 0.0 : on_die_m, 0, 0};
+      impulses.count = 2;
+      gatherer.Touch({.contact = {.handle = 3}, .partner = 4}, impulses);
+    });
+  };
+  EXPECT_EQ(land(0.001, 0.3).size(), 2U);  // each strikes both bodies
+  EXPECT_EQ(land(0.015, 0.015).size(), 4U);
+}
+
+TEST(BlowGatherer, CornersWhoseImpulsesAreGreatestInNeighbouringStepsLandTogether) {
+  const std::vector<ForceEvent> blows = BlowsOf(40, [](auto& gatherer, int step) {
+    if (step != 20 && step != 21) return;
+    gatherer.Touch({.contact = {.handle = 3}}, At(0, step == 20 ? 0.6 : 0.4));
+    gatherer.Touch({.contact = {.handle = 3}}, At(0.4, step == 20 ? 0.4 : 0.6));
+  });
+  ASSERT_EQ(blows.size(), 2U);
+  EXPECT_EQ(blows[0].time_s, blows[1].time_s);
+  for (const ForceEvent& blow : blows) {
+    EXPECT_NEAR(*ImpulseOf(blow), 1, 1e-6);
+    EXPECT_DOUBLE_EQ(blow.collision.reduced_mass_kg, 0.5);
+  }
+}
+
 /// The speed that a body of half implicit steps has in the step in which it meets the floor, m/s.
 constexpr double kFallMPerS = 9.81 * kStepS * 20;
 
@@ -486,7 +580,7 @@ std::vector<ForceEvent> Fall(const std::vector<BodyImpulses>& impulses, double l
   return BlowsOf(21, [&](auto& gatherer, int step) {
     if (step == 0) return;
     if (step < 20) height_m -= 9.81 * kStepS * kStepS * step;
-    gatherer.Move(3, 1, {.position_m = {0, 0, step < 18 ? height_m + leap_m : height_m}});
+    gatherer.Move(3, 1, {.position_m = {0, 0, step < 19 ? height_m + leap_m : height_m}});
     if (step < 20) return;
     for (const BodyImpulses& impulse : impulses) {
       gatherer.Touch({.contact = {.handle = 3}}, impulse);
