@@ -29,6 +29,13 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+/// The frame at or before a time since the first frame, s, and the time since that frame, s.
+std::pair<size_t, double> FrameAt(const Motion& motion, double time_s) {
+  const double frames = time_s / motion.frame_s;
+  const size_t frame = std::min(static_cast<size_t>(frames + 1e-9), motion.frame_count() - 2);
+  return {frame, std::max(0.0, frames - static_cast<double>(frame)) * motion.frame_s};
+}
+
 /// The contacts of one pair while they are divided into blows and loads.
 class PairReading {
  public:
@@ -265,37 +272,13 @@ class PairReading {
     blow.point_a_m /= sum;
     blow.point_b_m /= sum;
     std::tie(blow.frame, blow.time_s) = FrameOf(time_s);
-    blow.orientation_a =
-        bodies_.motions[pair_.a].At(blow.frame, blow.time_s, Path::kKnown).orientation;
-    blow.orientation_b =
-        bodies_.motions[pair_.b].At(blow.frame, blow.time_s, Path::kKnown).orientation;
-    blow.approach_m_per_s = Approach(blow, pieces.front().candidate->feature.normal, time_s);
+    blow.normal = pieces.front().candidate->feature.normal;
+    if (blow.normal.dot(impulse) < 0) blow.normal = -blow.normal;
     found.blows.push_back(blow);
   }
 
   /// The frame at or before a time since the first frame, s, and the time since that frame, s.
-  std::pair<size_t, double> FrameOf(double time_s) const {
-    const double frames = time_s / motion_.frame_s;
-    const size_t frame = std::min(static_cast<size_t>(frames + 1e-9), forces_.size() - 2);
-    return {frame, std::max(0.0, frames - static_cast<double>(frame)) * motion_.frame_s};
-  }
-
-  /// The speed at which both bodies approach each other at a blow: that of one bin before, when
-  /// nothing of the blow has acted yet, and of the free flight since then.
-  double Approach(const FoundBlow& blow, Vector normal, double time_s) const {
-    const double before_s = std::max(0.0, time_s - bin_s_);
-    const std::pair<size_t, double> before = FrameOf(before_s);
-    const auto velocity = [&](uint32_t body, const Turn& orientation, const Vector& point_m) {
-      const BodyMotion& motion = bodies_.motions[body];
-      Vector of = motion.KnownVelocity(before.first, before.second,
-                                       orientation * (point_m - motion.centre_m()));
-      if (motion.balanced()) of += motion_.gravity_m_per_s2 * (time_s - before_s);
-      return of;
-    };
-    if (normal.dot(blow.impulse_newton_seconds) < 0) normal = -normal;
-    return std::max(0.0, normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
-                                    velocity(blow.a, blow.orientation_a, blow.point_a_m)));
-  }
+  std::pair<size_t, double> FrameOf(double time_s) const { return FrameAt(motion_, time_s); }
 
   void AddLoad(size_t frame, const Piece& piece, FoundContacts& found) const {
     if (piece.impulse.isZero(0)) return;
@@ -373,6 +356,27 @@ FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
   std::ranges::stable_sort(found.loads, {}, &FoundLoad::frame);
   found.confidence = ReadConfidence(motion, bodies, problem);
   return found;
+}
+
+void SetApproach(const Motion& motion, const SearchBodies& bodies, double bin_s, FoundBlow& blow) {
+  const auto orientation = [&](uint32_t body) {
+    return bodies.motions[body].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+  };
+  blow.orientation_a = orientation(blow.a);
+  blow.orientation_b = orientation(blow.b);
+  const double time_s = static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
+  const double before_s = std::max(0.0, time_s - bin_s);
+  const auto [frame, since_s] = FrameAt(motion, before_s);
+  const auto velocity = [&, frame = frame, since_s = since_s](uint32_t body, const Turn& turn,
+                                                              const Vector& point_m) {
+    const BodyMotion& of_body = bodies.motions[body];
+    Vector of = of_body.KnownVelocity(frame, since_s, turn * (point_m - of_body.centre_m()));
+    if (of_body.balanced()) of += motion.gravity_m_per_s2 * (time_s - before_s);
+    return of;
+  };
+  blow.approach_m_per_s =
+      std::max(0.0, blow.normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
+                                    velocity(blow.a, blow.orientation_a, blow.point_a_m)));
 }
 
 void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double frame_s) {

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
+#include "client_sdk/motion/blow_refinement.h"
 #include "client_sdk/motion/contact_problem.h"
 #include "client_sdk/motion/contact_reading.h"
 #include "client_sdk/motion/contact_search.h"
@@ -227,6 +228,10 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
     others[i] = ReadContacts(motion, *bodies, search, varied);
   });
   SetAmbiguity(found, others, motion.frame_s);
+  RefineBlows(motion, search.pairs(), *bodies, found);
+  for (FoundBlow& blow : found.blows) {
+    SetApproach(motion, *bodies, motion.frame_s / search.bin_count(), blow);
+  }
   SetNearest(motion, *bodies, found.confidence);
   SetDeepest(motion, *bodies, found);
   SetSunk(motion, *bodies, found.confidence);

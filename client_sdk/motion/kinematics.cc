@@ -81,11 +81,14 @@ void BodyMotion::Know(const std::vector<std::vector<BodyImpulse>>& impulses,
                       std::vector<Vector> forces) {
   forces_ = std::move(forces);
   for (size_t k = 0; k < impulses_.size(); ++k) {
-    if (impulses_[k].empty() && impulses[k].empty()) continue;
-    impulses_[k] = impulses[k];
-    std::ranges::stable_sort(impulses_[k], {}, &BodyImpulse::time_s);
-    Shoot(k);
+    if (!impulses_[k].empty() || !impulses[k].empty()) Know(k, impulses[k]);
   }
+}
+
+void BodyMotion::Know(size_t interval, std::vector<BodyImpulse> impulses) {
+  impulses_[interval] = std::move(impulses);
+  std::ranges::stable_sort(impulses_[interval], {}, &BodyImpulse::time_s);
+  Shoot(interval);
 }
 
 Vector BodyMotion::Impulse(size_t node) const {

@@ -70,6 +70,11 @@ class BodyMotion {
   /// Takes the impulses and the forces (one for each frame) that were found, after which Torque()
   /// and Path::kKnown follow from them.
   void Know(const std::vector<std::vector<BodyImpulse>>& impulses, std::vector<Vector> forces);
+  /// Takes other impulses in one interval.
+  void Know(size_t interval, std::vector<BodyImpulse> impulses);
+  const std::vector<BodyImpulse>& known_impulses(size_t interval) const {
+    return impulses_[interval];
+  }
 
  private:
   bool moves() const { return places_.size() > 1; }

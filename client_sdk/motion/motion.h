@@ -88,6 +88,7 @@ struct ContactPoint {
 struct FoundBlow : ContactPoint {
   double time_s = 0;                               ///< since frame `frame`
   Vector impulse_newton_seconds = Vector::Zero();  ///< in the scene's axes
+  Vector normal = Vector::Zero();                  ///< towards a, in the scene's axes
   Turn orientation_a = Turn::Identity();           ///< how a lies at the time of the blow
   Turn orientation_b = Turn::Identity();
   /// Speed at which the bodies approach each other there before, m/s; 0 if it is not known.

@@ -17,7 +17,7 @@ constexpr double kFaintSpeed = 0.012;
 /// Frames of this distance, s, still tell most blows apart.
 constexpr double kLongestFrame = 0.05;
 /// A body may turn by this angle, rad, between two frames.
-constexpr double kMostTurn = 1.5;
+constexpr double kMostTurnApart = 1.5;
 
 using Change = Eigen::Matrix<double, 6, 1>;
 
@@ -82,7 +82,7 @@ PoseNoise MeasureNoise(const Motion& motion) {
   }
   double most =
       std::min(kLongestFrame / motion.frame_s, static_cast<double>(motion.frame_count()) / 8);
-  if (turn > 0) most = std::min(most, kMostTurn / turn);
+  if (turn > 0) most = std::min(most, kMostTurnApart / turn);
   most = std::max(1.0, most);
   const double wanted = std::max(1.0, std::ceil(speed / kFaintSpeed));
   return {.place_m = speed * motion.frame_s / std::sqrt(6.0),
