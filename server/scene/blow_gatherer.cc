@@ -421,8 +421,12 @@ double BlowGatherer::ApproachSpeed(std::span<const PairTouch> touches) const {
 void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
   Blow& blow = pair.blow;
   if (!blow.begun()) {
+    const auto lately = [this](const std::optional<double>& time_s) {
+      return time_s && *time_s_ - *time_s <= kLastingS;
+    };
     blow.lasting =
-        pair.touched_s && *time_s_ - *pair.touched_s <= kLastingS && !StrikesElsewhere(pair);
+        lately(pair.touched_s) && (lately(pair.blow_before_last_s) || !StrikesElsewhere(pair));
+    pair.blow_before_last_s = std::exchange(pair.last_blow_s, time_s_);
     blow.greatest = 0;
     blow.strokes.clear();
   }

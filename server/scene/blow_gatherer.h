@@ -93,7 +93,8 @@ struct ForceEvent {
 /// within one step after the step in which it is over. The time is uniformly distributed, so that
 /// the mean spectrum of such blows has no lines. The time is a function of the simulation time and
 /// of the two bodies, so that the same simulation gives the same events. The first blow after a
-/// flight or at another place, and contacts with a time offset of their own, have exact times.
+/// flight, the next one if it is at another place, and contacts with a time offset of their own
+/// have exact times.
 class BlowGatherer {
  public:
   /// Events, valid until the next call of a function that returns events.
@@ -245,6 +246,7 @@ class BlowGatherer {
     std::span<const PairTouch> touches{};            // of this step, in touches_
     std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
     std::array<Motion, 2> given{};                   // what it gave its objects in the last touch
+    std::optional<double> last_blow_s = std::nullopt, blow_before_last_s = std::nullopt;
     Blow blow{};
   };
 
