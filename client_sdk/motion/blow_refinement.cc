@@ -218,7 +218,7 @@ class Refinement {
         impulses.push_back({impact.share * motion_.frame_s, f, impact.ArmOf(body).cross(f)});
       }
       if (interval == group.interval || !struck_.contains({interval, body})) {
-        bodies_.motions[body].Know(interval, impulses.empty() ? known : std::move(impulses));
+        bodies_.motions[body].Know(interval, impulses.empty() ? known : impulses);
       }
     }
   }
