@@ -2,6 +2,7 @@
 #include "client_sdk/motion/blow_refinement.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -217,7 +218,9 @@ class Refinement {
         const Vector f = impact.On(body);
         impulses.push_back({impact.share * motion_.frame_s, f, impact.ArmOf(body).cross(f)});
       }
-      if (interval == group.interval || !struck_.contains({interval, body})) {
+      if (interval == group.interval) {
+        bodies_.motions[body].Know(interval, impulses);
+      } else if (!struck_.contains({interval, body})) {
         bodies_.motions[body].Know(interval, impulses.empty() ? known : impulses);
       }
     }
@@ -358,16 +361,17 @@ class Refinement {
   }
 
   /// Returns whether a blow may move to an interval: to the one in which it was found, or to a
-  /// neighbour in which nothing else strikes its bodies.
+  /// neighbour if nothing else strikes its bodies there or just beyond.
   bool MayBeIn(const Impact& impact, size_t interval) const {
-    const FoundBlow& blow = *impact.blow;
-    if (interval == blow.frame) return true;
-    const auto is_free = [&](size_t body) {
-      return !balanced(body) || (has_row(body, interval) && has_row(body, interval + 1) &&
-                                 !struck_.contains({interval, body}));
-    };
-    return interval + 1 >= blow.frame && interval <= blow.frame + 1 && is_free(blow.a) &&
-           is_free(blow.b);
+    const size_t found = impact.blow->frame;
+    if (interval == found) return true;
+    if (interval + 1 < found || interval > found + 1) return false;
+    const size_t beyond = 2 * interval - std::min(found, 2 * interval);
+    return std::ranges::all_of(std::array{impact.blow->a, impact.blow->b}, [&](size_t body) {
+      return !balanced(body) ||
+             (has_row(body, interval) && has_row(body, interval + 1) &&
+              !struck_.contains({interval, body}) && !struck_.contains({beyond, body}));
+    });
   }
 
   /// Brings an impulse back into its cone of friction, and its time into an interval.
