@@ -26,6 +26,11 @@ constexpr double kMostUnknown = 0.7;
 constexpr double kApart = 0.25;
 /// or if correction lowers the energy that they leave unexplained by less than this share.
 constexpr double kLeastGain = 0.1;
+/// Corners that cannot be told apart have one time if that leaves at most this share of their
+/// energy unexplained.
+constexpr double kMostLost = 0.01;
+/// The correction of a group begins with one time if that leaves at most this share unexplained.
+constexpr double kMostLostAtFirst = 0.1;
 
 /// A blow while it is corrected.
 struct Impact {
@@ -33,11 +38,13 @@ struct Impact {
   double friction = 0, per_kg = 0;
   Vector arm_a = Vector::Zero(), arm_b = Vector::Zero();
   Vector found = Vector::Zero(), impulse = Vector::Zero();
-  size_t frame = 0;       ///< the one at or before the blow
-  double share = 0;       ///< of the interval that passes before the blow
-  double found_time = 0;  ///< in frames
+  size_t found_frame = 0, frame = 0;  ///< the one at or before the blow
+  double found_share = 0, share = 0;  ///< of the interval that passes before the blow
 
-  double time() const { return static_cast<double>(frame) + share; }
+  /// How many frames later it is than it was found.
+  double Later() const {
+    return static_cast<double>(frame) - static_cast<double>(found_frame) + share - found_share;
+  }
   /// The part of the impulse that the balance at a frame has.
   double PartAt(size_t node) const {
     if (node == frame) return 1 - share;
@@ -77,8 +84,8 @@ struct Group {
   std::vector<Node> nodes;
   /// What the bodies knew before in the interval and its neighbours.
   std::map<std::pair<size_t, size_t>, std::vector<BodyImpulse>> known;
-  double unexplained = 0;  ///< before correction, J
-  double least_gain = 0;   ///< by which correction must lower it, J
+  double unexplained = 0, unexplained_as_read = 0;  ///< before correction, J
+  double least_gain = 0;                            ///< by which correction must lower it, J
 };
 
 class Refinement {
@@ -93,22 +100,22 @@ class Refinement {
       for (const uint32_t body : {blow.a, blow.b}) {
         if (balanced(body)) impact.per_kg += 1 / bodies.motions[body].mass_kg();
       }
-      impact.found = impact.impulse = blow.impulse_newton_seconds;
-      impact.frame = blow.frame;
-      impact.share = blow.time_s / motion.frame_s;
-      impact.found_time = impact.time();
+      impact.found = blow.balanced_newton_seconds;
+      const double frames = blow.balanced_s / motion.frame_s;
+      impact.found_frame = std::min(static_cast<size_t>(frames + 1e-9), motion.frame_count() - 2);
+      impact.found_share = std::max(0.0, frames - static_cast<double>(impact.found_frame));
       impacts_.push_back(impact);
     }
     FindGroups();
   }
 
   void Run() {
+    ChooseForGroups();
     for (int pass = 0; pass <= kPasses; ++pass) {
       SetArms();
       SetRows();
       for (Group& group : groups_) {
         const double energy = Residual(group).squaredNorm();
-        if (pass == 0) SetUnexplained(group);
         if (pass == kPasses && energy > group.unexplained - group.least_gain) Revert(group);
         if (pass < kPasses) Improve(group);
       }
@@ -147,7 +154,7 @@ class Refinement {
       const FoundBlow& blow = *impacts_[i].blow;
       for (const uint32_t body : {blow.a, blow.b}) {
         if (!balanced(body)) continue;
-        const auto [other, is_new] = first.try_emplace({blow.frame, body}, i);
+        const auto [other, is_new] = first.try_emplace({impacts_[i].found_frame, body}, i);
         if (!is_new) parent[root(i)] = root(other->second);
       }
     }
@@ -155,12 +162,48 @@ class Refinement {
     for (size_t i = 0; i < impacts_.size(); ++i) groups[root(i)].members.push_back(i);
     for (auto& [_, group] : groups) {
       Complete(group);
-      if (MayImprove(group)) groups_.push_back(std::move(group));
+      groups_.push_back(std::move(group));
     }
   }
 
+  /// Takes a blow as it balances the momenta, or as it was read.
+  void Take(Impact& impact, bool as_read) const {
+    const FoundBlow& blow = *impact.blow;
+    impact.impulse = as_read ? blow.impulse_newton_seconds : impact.found;
+    impact.frame = as_read ? blow.frame : impact.found_frame;
+    impact.share = as_read ? blow.time_s / motion_.frame_s : impact.found_share;
+  }
+
+  /// Takes each group as it balances the momenta. A group that may not be corrected is taken as it
+  /// was read, unless that loses too much momentum.
+  void ChooseForGroups() {
+    for (const bool as_read : {true, false}) {
+      for (Impact& impact : impacts_) Take(impact, as_read);
+      SetArms();
+      SetRows();
+      for (Group& group : groups_) {
+        if (as_read) group.unexplained_as_read = Residual(group).squaredNorm();
+        if (!as_read) SetUnexplained(group);
+      }
+    }
+    std::erase_if(groups_, [this](const Group& group) {
+      const bool may_improve = MayImprove(group);
+      const double most_lost = may_improve ? kMostLostAtFirst : kMostLost;
+      for (const size_t i : group.members) Take(impacts_[i], MayBeAsRead(group, most_lost));
+      return !may_improve;
+    });
+  }
+
+  bool MayBeAsRead(const Group& group, double most_lost) const {
+    double given = 0;
+    for (const size_t i : group.members) {
+      given += impacts_[i].found.squaredNorm() * impacts_[i].per_kg;
+    }
+    return group.unexplained_as_read < group.unexplained + most_lost * given;
+  }
+
   void Complete(Group& group) const {
-    group.interval = impacts_[group.members.front()].blow->frame;
+    group.interval = impacts_[group.members.front()].found_frame;
     for (size_t body = 0; body < bodies_.motions.size(); ++body) {
       const auto strikes = [&](size_t i) { return impacts_[i].strikes(body); };
       if (!balanced(body) || !std::ranges::any_of(group.members, strikes)) continue;
@@ -227,12 +270,7 @@ class Refinement {
   }
 
   void Revert(const Group& group) {
-    for (const size_t i : group.members) {
-      Impact& impact = impacts_[i];
-      impact.impulse = impact.found;
-      impact.frame = impact.blow->frame;
-      impact.share = impact.found_time - static_cast<double>(impact.frame);
-    }
+    for (const size_t i : group.members) Take(impacts_[i], MayBeAsRead(group, kMostLost));
     for (const auto& [place, known] : group.known) {
       const auto& [body, interval] = place;
       if (interval == group.interval || !struck_.contains({interval, body})) {
@@ -343,7 +381,7 @@ class Refinement {
     for (size_t m = 0; m < group.members.size(); ++m) {
       const Impact& impact = impacts_[group.members[m]];
       moved.segment<4>(static_cast<Index>(4 * m)) << impact.impulse - impact.found,
-          impact.found.norm() * (impact.time() - impact.found_time);
+          impact.found.norm() * impact.Later();
     }
     return moved;
   }
@@ -363,7 +401,7 @@ class Refinement {
   /// Returns whether a blow may move to an interval: to the one in which it was found, or to a
   /// neighbour if nothing else strikes its bodies there or just beyond.
   bool MayBeIn(const Impact& impact, size_t interval) const {
-    const size_t found = impact.blow->frame;
+    const size_t found = impact.found_frame;
     if (interval == found) return true;
     if (interval + 1 < found || interval > found + 1) return false;
     const size_t beyond = 2 * interval - std::min(found, 2 * interval);

@@ -13,6 +13,8 @@ namespace {
 constexpr double kShareOfLoad = 0.2;
 /// and changes the relative velocity of the bodies by at least this, m/s.
 constexpr double kLeastSpeed = 0.02;
+/// Blows that lie closer than this part of a frame strike together.
+constexpr double kTogether = 0.02;
 /// Impulses that can be divided more evenly by less than this part stay as they are.
 constexpr double kLeastEven = 0.05;
 
@@ -61,6 +63,7 @@ class PairReading {
     std::ranges::stable_sort(pieces_, {}, &Piece::time_s);
     ReadBlows();
     ReadLeaps();
+    JoinPlaces();
     for (const std::vector<Piece>& blow : blows_) AddBlow(blow, found);
     for (const auto& [frame, piece] : loads_) AddLoad(frame, piece, found);
   }
@@ -156,6 +159,25 @@ class PairReading {
       return;
     }
     blows_.push_back(std::move(pieces));
+  }
+
+  /// Moves pieces to the blow before, if it has their place less than a frame earlier.
+  void JoinPlaces() {
+    std::ranges::stable_sort(blows_, {}, MeanTime);
+    for (size_t i = 1; i < blows_.size(); ++i) {
+      std::vector<Piece>& before = blows_[i - 1];
+      const std::vector<Piece> places = before;
+      std::erase_if(blows_[i], [&](const Piece& piece) {
+        const auto is_it = [&](const Piece& place) {
+          return AtOnePlace(place, piece) &&
+                 std::abs(piece.time_s - place.time_s) < 0.99 * motion_.frame_s;
+        };
+        if (!std::ranges::any_of(places, is_it)) return false;
+        before.push_back(piece);
+        return true;
+      });
+    }
+    std::erase_if(blows_, [](const std::vector<Piece>& blow) { return blow.empty(); });
   }
 
   bool AtOnePlace(const Piece& one, const Piece& other) const {
@@ -266,8 +288,10 @@ class PairReading {
       sum += size;
       blow.point_a_m += size * piece.candidate->feature.point_a;
       blow.point_b_m += size * piece.candidate->feature.point_b;
+      blow.balanced_newton_seconds += piece.impulse;
     }
     if (sum == 0) return;
+    blow.balanced_s = MeanTime(pieces);
     blow.impulse_newton_seconds = impulse;
     blow.point_a_m /= sum;
     blow.point_b_m /= sum;
@@ -358,25 +382,41 @@ FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
   return found;
 }
 
-void SetApproach(const Motion& motion, const SearchBodies& bodies, double bin_s, FoundBlow& blow) {
-  const auto orientation = [&](uint32_t body) {
-    return bodies.motions[body].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_s,
+                   FoundContacts& found) {
+  const auto time_of = [&motion](const FoundBlow& blow) {
+    return static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
   };
-  blow.orientation_a = orientation(blow.a);
-  blow.orientation_b = orientation(blow.b);
-  const double time_s = static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
-  const double before_s = std::max(0.0, time_s - bin_s);
-  const auto [frame, since_s] = FrameAt(motion, before_s);
-  const auto velocity = [&, frame = frame, since_s = since_s](uint32_t body, const Turn& turn,
-                                                              const Vector& point_m) {
-    const BodyMotion& of_body = bodies.motions[body];
-    Vector of = of_body.KnownVelocity(frame, since_s, turn * (point_m - of_body.centre_m()));
-    if (of_body.balanced()) of += motion.gravity_m_per_s2 * (time_s - before_s);
-    return of;
-  };
-  blow.approach_m_per_s =
-      std::max(0.0, blow.normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
-                                    velocity(blow.a, blow.orientation_a, blow.point_a_m)));
+  for (size_t i = 0; i < found.blows.size(); ++i) {
+    FoundBlow& blow = found.blows[i];
+    const auto orientation = [&](uint32_t body) {
+      return bodies.motions[body].At(blow.frame, blow.time_s, Path::kKnown).orientation;
+    };
+    blow.orientation_a = orientation(blow.a);
+    blow.orientation_b = orientation(blow.b);
+    const double time_s = time_of(blow);
+    double before_s = std::max(0.0, time_s - bin_s);
+    for (size_t k = i; k-- > 0 && time_s - time_of(found.blows[k]) < 2 * bin_s;) {
+      const FoundBlow& other = found.blows[k];
+      const double since_s = time_s - time_of(other);
+      const bool shares =
+          other.a == blow.a || other.a == blow.b || other.b == blow.a || other.b == blow.b;
+      if (shares && since_s > kTogether * motion.frame_s) {
+        before_s = std::max(before_s, time_s - since_s / 2);
+      }
+    }
+    const auto [frame, since_s] = FrameAt(motion, before_s);
+    const auto velocity = [&, frame = frame, since_s = since_s](uint32_t body, const Turn& turn,
+                                                                const Vector& point_m) {
+      const BodyMotion& of_body = bodies.motions[body];
+      Vector of = of_body.KnownVelocity(frame, since_s, turn * (point_m - of_body.centre_m()));
+      if (of_body.balanced()) of += motion.gravity_m_per_s2 * (time_s - before_s);
+      return of;
+    };
+    blow.approach_m_per_s =
+        std::max(0.0, blow.normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
+                                      velocity(blow.a, blow.orientation_a, blow.point_a_m)));
+  }
 }
 
 void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double frame_s) {

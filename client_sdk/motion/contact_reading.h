@@ -10,9 +10,10 @@ namespace carillon::motion {
 FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
                            const ContactSearch& search, const ContactProblem& problem);
 
-/// Sets how the bodies lie at a blow, and how fast they approach each other: as fast as one bin
-/// before, when nothing of the blow has acted yet, and as free flight has made them since then.
-void SetApproach(const Motion& motion, const SearchBodies& bodies, double bin_s, FoundBlow& blow);
+/// Sets how the bodies lie at each blow, and how fast they approach each other: as fast as one bin
+/// before, but after the blow before of either body, and as free flight has made them since then.
+void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_s,
+                   FoundContacts& found);
 
 /// Sets how much the blows differ from those of other solutions within a frame of them.
 void SetAmbiguity(FoundContacts& found, const std::vector<FoundContacts>& others, double frame_s);

@@ -229,9 +229,7 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
   });
   SetAmbiguity(found, others, motion.frame_s);
   RefineBlows(motion, search.pairs(), *bodies, found);
-  for (FoundBlow& blow : found.blows) {
-    SetApproach(motion, *bodies, motion.frame_s / search.bin_count(), blow);
-  }
+  SetApproaches(motion, *bodies, motion.frame_s / search.bin_count(), found);
   SetNearest(motion, *bodies, found.confidence);
   SetDeepest(motion, *bodies, found);
   SetSunk(motion, *bodies, found.confidence);

@@ -95,6 +95,10 @@ struct FoundBlow : ContactPoint {
   double approach_m_per_s = 0;
   /// Share of the impulse that other solutions, which explain the motion as well, do not have.
   double ambiguity = 0;
+  /// The time since the first frame and the impulse that balance the momenta. Above, corners that
+  /// cannot be told apart have one time, and even impulses.
+  double balanced_s = 0;
+  Vector balanced_newton_seconds = Vector::Zero();
 };
 
 /// The force of a contact that rests, slides or rolls, at the time of its frame. It is

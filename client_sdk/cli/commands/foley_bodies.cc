@@ -171,15 +171,25 @@ absl::Status SetMass(const FoleyOptions& options, const motion::SceneBody& given
   return absl::OkStatus();
 }
 
-/// Adds a thick square whose upper side is at a height against gravity.
-void AddFloor(double height_m, const Vector& gravity, FoleyScene& foley) {
+/// Adds a thick square whose upper side is at a height against gravity, and which reaches beyond
+/// all bodies.
+void AddFloor(double height_m, double metres_per_unit, FoleyScene& foley) {
+  const Vector& gravity = foley.scene.motion.gravity_m_per_s2;
+  Eigen::AlignedBox3d places;
+  for (const MovingBody& body : foley.scene.motion.bodies) {
+    for (const motion::BodyPose& pose : body.poses)
+      places.extend(metres_per_unit * pose.position_m);
+  }
   MovingBody floor;
   floor.name = "floor";
   const Vector up = gravity.norm() > 0 ? Vector(-gravity.normalized()) : Vector(Vector::UnitZ());
-  floor.poses.push_back({up * height_m, motion::Turn::FromTwoVectors(Vector::UnitZ(), up)});
+  const Vector centre = places.isEmpty() ? Vector(Vector::Zero()) : places.center();
+  const double half_m = kFloorHalfM + (places.isEmpty() ? 0 : places.diagonal().norm());
+  floor.poses.push_back({centre + (height_m - up.dot(centre)) * up,
+                         motion::Turn::FromTwoVectors(Vector::UnitZ(), up)});
   for (uint32_t i = 0; i < 8; ++i) {
-    floor.surface.vertices_m.emplace_back((i & 1U) != 0 ? kFloorHalfM : -kFloorHalfM,
-                                          (i & 2U) != 0 ? kFloorHalfM : -kFloorHalfM,
+    floor.surface.vertices_m.emplace_back((i & 1U) != 0 ? half_m : -half_m,
+                                          (i & 2U) != 0 ? half_m : -half_m,
                                           (i & 4U) != 0 ? 0 : -kFloorThickM);
   }
   floor.surface.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
@@ -233,7 +243,7 @@ absl::StatusOr<FoleyScene> ReadFoleyScene(const FoleyOptions& options) {
     const auto& g = *options.gravity_m_per_s2;
     motion.gravity_m_per_s2 = {g[0], g[1], g[2]};
   }
-  if (options.floor_m) AddFloor(*options.floor_m, motion.gravity_m_per_s2, foley);
+  if (options.floor_m) AddFloor(*options.floor_m, options.metres_per_unit, foley);
   RETURN_IF_ERROR(CheckPatterns(options, motion));
   foley.bodies.resize(motion.bodies.size());
   for (size_t i = 0; i < motion.bodies.size(); ++i) {

@@ -160,7 +160,9 @@ absl::Status CheckFall(const motion::Motion& motion, const FoleyOptions& options
 /// Returns by which factor all meshes would have to be larger for contacts to explain the motion
 /// best, or 1 if none lets them explain it.
 double FindMeshFactor(const FoleyScene& foley, const motion::FoundContacts& found) {
-  const bool may_be_small = found.confidence.sunk_part <= kSunk;
+  // Bodies that are drawn too small never meet where they strike.
+  const bool may_be_small = found.confidence.sunk_part <= kSunk &&
+                            (found.blows.empty() || found.confidence.apart_part > kApart);
   double best = 1, least = kWrong;
   for (const double factor : {0.01, 0.001, 100.0, 1000.0}) {
     if (factor > 1 && !may_be_small) continue;

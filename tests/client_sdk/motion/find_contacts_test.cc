@@ -208,6 +208,35 @@ TEST(FindContacts, FindsBouncesInBulletAtAnyFrameRate) {
   }
 }
 
+/// The share of the energy of a body's linear momentum that its blows and loads leave unexplained.
+double LinearlyUnexplained(const Motion& motion, uint32_t body, const FoundContacts& found) {
+  const MovingBody& moves = motion.bodies[body];
+  std::vector<Vector> lacks(motion.frame_count(), Vector::Zero());
+  double given = 0;
+  for (size_t k = 1; k + 1 < lacks.size(); ++k) {
+    const Vector jump = moves.poses[k + 1].position_m - 2 * moves.poses[k].position_m +
+                        moves.poses[k - 1].position_m;
+    lacks[k] = moves.mass_kg * (jump / motion.frame_s - motion.gravity_m_per_s2 * motion.frame_s);
+    given += lacks[k].squaredNorm();
+  }
+  for (const FoundBlow& blow : found.blows) {
+    const double share = blow.time_s / motion.frame_s;
+    const Vector on_body = (blow.a == body ? 1 : -1) * blow.impulse_newton_seconds;
+    lacks[blow.frame] -= (1 - share) * on_body;
+    lacks[blow.frame + 1] -= share * on_body;
+  }
+  for (const FoundLoad& load : found.loads) {
+    const Vector on_body = (load.a == body ? 1 : -1) * load.force_newtons * motion.frame_s / 6;
+    for (size_t k = std::max<size_t>(load.frame, 1) - 1;
+         k <= std::min(load.frame + 1, lacks.size() - 1); ++k) {
+      lacks[k] -= (k == load.frame ? 4 : 1) * on_body;
+    }
+  }
+  double residual = 0;
+  for (size_t k = 1; k + 1 < lacks.size(); ++k) residual += lacks[k].squaredNorm();
+  return residual / given;
+}
+
 TEST(FindContacts, FindsTheCornersOfABoxWhereverTheyLandInAFrame) {
   // Blows at a frame compete with loads there.
   constexpr int kFalls = 20;
@@ -228,6 +257,8 @@ TEST(FindContacts, FindsTheCornersOfABoxWhereverTheyLandInAFrame) {
       error += is.median_vector_error / kFalls;
       ExpectOneUnit(fall.motion, found);
       EXPECT_LT(found.confidence.unexplained, rate == 120 ? 0.02 : 0.001) << rate << " " << i;
+      EXPECT_LT(LinearlyUnexplained(fall.motion, 1, found), rate == 120 ? 0.02 : 0.005)
+          << rate << " " << i;
     }
     EXPECT_LT(error, 0.05) << rate;
   }
