@@ -35,8 +35,9 @@ constexpr double kLastingS = 0.1;
 /// In some games gravity is twice as great as on Earth.
 constexpr double kFeebleMPerS2 = 2.5 * 9.81;
 /// A contact that has lasted is a load without a blow if its impulses exceed the load in all by at
-/// most this number of steps of the load: so much a solver's noise adds up to.
-constexpr double kSettling = 1.5;
+/// most this number of steps of the load, or by this number of standard deviations of the sum of
+/// its steps: so much a solver's noise adds up to.
+constexpr double kSettling = 1.5, kDeviations = 4;
 /// Part of the impulses of a load that rounding may leave of it.
 constexpr double kRounding = 1e-9;
 /// The speed of a blow, as a part of J/m, lies between these limits, because J is (1 + e) m v with
@@ -52,6 +53,8 @@ constexpr double kLostS = 0.01;
 /// A load continues with another partner if the cosine of its change of direction is greater than
 /// this, and if it does not grow more than the jitter of a load, see LoadTracker.
 constexpr double kLeastCosine = 0.7, kMostGrowth = 3;
+/// A blow grows by less than kMostGrowth from one step to the next after this number of steps.
+constexpr size_t kLeastBeforeLeap = 2;
 
 std::array<float, 3> Scaled(std::array<float, 3> vector, double factor) {
   for (float& component : vector) component *= static_cast<float>(factor);
@@ -346,6 +349,7 @@ void BlowGatherer::Divide(Pair& pair) {
   if (elsewhere) pair.load.ForgetBlows();
   // The part of the impulse that exceeds the load, 0 to 1.
   const double share_of_new_blow = pair.load.Next(impulse, step_s_);
+  EndBeforeLeap(pair, force);
   double share = share_of_new_blow;
   if (pair.blow.begun()) {
     share = force > 0 ? std::max(1 - pair.blow.load_newtons / force, 0.0) : 0;
@@ -355,7 +359,8 @@ void BlowGatherer::Divide(Pair& pair) {
   Blow& blow = pair.blow;
   if (Flickers(blow, force)) share = IsFeeble(pair) ? 0 : share_of_new_blow;
   if (blow.begun() && IsOver(blow, force, share * impulse, elsewhere, remains)) {
-    if (HasLasted(blow) && ImpulseAbove(blow, remains) <= kSettling * remains * step_s_) {
+    if ((HasLasted(blow) || blow.only_feeble) &&
+        ImpulseAbove(blow, remains) <= Settling(blow) * remains * step_s_) {
       CountAsLoad(blow);
     } else {
       SendBlow(pair, remains);
@@ -380,6 +385,18 @@ void BlowGatherer::Divide(Pair& pair) {
     pair.given = GivenBy(pair.touches);
   }
   pair.touches = {};
+}
+
+void BlowGatherer::EndBeforeLeap(Pair& pair, double force_newtons) {
+  Blow& blow = pair.blow;
+  if (blow.steps.size() < kLeastBeforeLeap || blow.lost_steps > 0) return;
+  const double greatest = std::ranges::max(blow.steps, {}, &Blow::Step::force).force;
+  if (force_newtons <= kMostGrowth * greatest) return;
+  if (blow.only_feeble) {
+    CountAsLoad(blow);
+  } else {
+    SendBlow(pair, 0);
+  }
 }
 
 void BlowGatherer::CountAsLoad(Blow& blow) {
@@ -428,10 +445,12 @@ void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
         lately(pair.touched_s) && (lately(pair.blow_before_last_s) || !StrikesElsewhere(pair));
     pair.blow_before_last_s = std::exchange(pair.last_blow_s, time_s_);
     blow.greatest = 0;
+    blow.only_feeble = true;
     blow.strokes.clear();
   }
   blow.steps.push_back({.impulse = impulse, .force = force_newtons, .time_s = *time_s_});
   blow.greatest = std::max(blow.greatest, impulse);
+  blow.only_feeble = blow.only_feeble && IsFeeble(pair);
   AddToStrokes(blow, pair.touches, impulse / (force_newtons * step_s_));
 }
 
@@ -504,10 +523,12 @@ bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse
     remains = MeanForceOfLastHalf(blow);
     return true;
   }
-  remains = force_newtons;
+  remains = 0;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
   if (impulse > blow.greatest / 2 || blow.steps.size() < steps + 1) return false;
-  return force_newtons >= 0.75 * blow.steps[blow.steps.size() - steps].force;
+  const auto last = std::span(blow.steps).last(steps);
+  for (const Blow::Step& step : last) remains += step.force / static_cast<double>(steps);
+  return force_newtons >= 0.75 * last.front().force;
 }
 
 bool BlowGatherer::HasLasted(const Blow& blow) const {
@@ -519,6 +540,16 @@ double BlowGatherer::MeanForceOfLastHalf(const Blow& blow) {
   double sum = 0;
   for (const Blow::Step& step : last) sum += step.force;
   return sum / static_cast<double>(last.size());
+}
+
+double BlowGatherer::Settling(const Blow& blow) {
+  const auto last = std::span(blow.steps).last(blow.steps.size() / 2);
+  const double mean = MeanForceOfLastHalf(blow);
+  double squares = 0;
+  for (const Blow::Step& step : last) squares += (step.force - mean) * (step.force - mean);
+  const double deviation = std::sqrt(squares / static_cast<double>(last.size())) / mean;
+  return std::max(kSettling,
+                  kDeviations * deviation * std::sqrt(static_cast<double>(blow.steps.size())));
 }
 
 double BlowGatherer::ImpulseAbove(const Blow& blow, double load_newtons) const {

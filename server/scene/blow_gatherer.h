@@ -216,6 +216,7 @@ class BlowGatherer {
     std::vector<Stroke> strokes{};  // in the order in which they began
     bool lasting = false;           // whether the bodies touched here shortly before the blow
     bool feeble = false;            // whether its first step may have been a load
+    bool only_feeble = true;        // whether all of its steps may have been a load
     int lost_steps = 0;             // steps since a feeble blow lost its contact
 
     bool begun() const { return !steps.empty(); }
@@ -278,6 +279,9 @@ class BlowGatherer {
   /// Adds a step's force to the time for which a feeble blow has lost its contact. Returns whether
   /// the contact returns before the blow is over, so that there was no blow.
   bool Flickers(Blow& blow, double force_newtons);
+  /// Ends a pair's blow if the force of this step is no growth of its own, but a leap: what was
+  /// gathered is a load, such as that of a body that was just laid down, or a blow of its own.
+  void EndBeforeLeap(Pair& pair, double force_newtons);
   /// Ends what turned out to be a load.
   void CountAsLoad(Blow& blow);
   /// Returns the mean of the speeds at which the places of the touches approach, weighted by their
@@ -295,6 +299,8 @@ class BlowGatherer {
   /// Returns whether a blow has lasted as long as one may: what touches then is a load.
   bool HasLasted(const Blow& blow) const;
   static double MeanForceOfLastHalf(const Blow& blow);
+  /// Returns by how many steps of the load that remains its noise may exceed it in all.
+  static double Settling(const Blow& blow);
   /// Returns the impulse of a blow above this load, N s.
   double ImpulseAbove(const Blow& blow, double load_newtons) const;
   /// Sends a pair's blow, and ends it.

@@ -556,6 +556,61 @@ TEST(BlowGatherer, ACornerThatSlidesFastOverAnotherBodyStrikesOnceAndOneThatRock
   EXPECT_EQ(land(0.015, 0.015).size(), 4U);
 }
 
+TEST(BlowGatherer, AStrongBlowSoonAfterABodyWasLaidDownHasItsOwnImpulse) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0, 2400.0}) {
+    const double weight = 9.81 / rate_hz;  // the impulse of 1 kg in a step
+    for (const int laid : {0, 30}) {       // in the first step, or after a flight
+      for (const double at_s : {0.02, 0.04, 0.08, 0.15}) {
+        const int struck = laid + static_cast<int>(std::ceil(at_s * rate_hz)) + 1;
+        const std::vector<ForceEvent> blows = BlowsOf(
+            struck + 400,
+            [&](auto& gatherer, int step) {
+              if (step < laid) return;
+              const double weights = step == struck ? 60 : 1;
+              gatherer.Touch({.contact = {.handle = 3}}, At(0, weights * weight));
+            },
+            1 / rate_hz);
+        double sum = 0, largest = 0;
+        for (const ForceEvent& blow : blows) {
+          sum += *ImpulseOf(blow) / weight;
+          largest = std::max(largest, *ImpulseOf(blow) / weight);
+        }
+        SCOPED_TRACE(testing::Message() << rate_hz << " Hz, " << laid << ", " << at_s);
+        EXPECT_NEAR(largest, 58, 2.1);  // up to three times the usual force is a load's jitter
+        EXPECT_LT(sum - largest, 1.1);
+      }
+    }
+  }
+}
+
+TEST(BlowGatherer, TheNoiseOfALoadThatWasJustLaidDownDoesNotStrike) {
+  for (const double rate_hz : {240.0, 1000.0}) {
+    for (unsigned seed = 1; seed <= 6; ++seed) {
+      std::mt19937 random(seed);
+      std::uniform_real_distribution<double> noise(0.4, 1.6);
+      const double weight = 9.81 / rate_hz;
+      const double struck = StruckBy(
+          1000, [&](auto& gatherer, int) { TouchBy(gatherer, noise(random) * weight); },
+          1 / rate_hz);
+      EXPECT_EQ(struck, 0) << rate_hz << " Hz, " << seed;
+    }
+  }
+}
+
+TEST(BlowGatherer, ABlowThatEndsInAGreaterLoadIsNotLost) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0, 2400.0}) {
+    const double weight = 9.81 / rate_hz;
+    const double struck = StruckBy(
+        600,
+        [&](auto& gatherer, int step) {
+          const double weights = step < 5 ? 1 : step == 5 ? 700 : step == 6 ? 200 : 50;
+          gatherer.Touch({.contact = {.handle = 3}}, At(0, weights * weight));
+        },
+        1 / rate_hz);
+    EXPECT_NEAR(struck / weight, 894, 1) << rate_hz;
+  }
+}
+
 TEST(BlowGatherer, CornersWhoseImpulsesAreGreatestInNeighbouringStepsLandTogether) {
   const std::vector<ForceEvent> blows = BlowsOf(40, [](auto& gatherer, int step) {
     if (step != 20 && step != 21) return;
