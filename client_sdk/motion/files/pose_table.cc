@@ -203,7 +203,11 @@ absl::StatusOr<MotionScene> ReadNpz(const std::string& path) {
   ASSIGN_OR_RETURN(const interchange::NpyArray name_array, ArrayOf(zip, path, "bodies"));
   ASSIGN_OR_RETURN(const std::vector<std::string> names, NamesOf(name_array));
   const size_t count = names.size();
-  if (x.size() != 3 * times.size() * count || q.size() != 4 * times.size() * count) {
+  const auto has_shape = [&](const interchange::NpyArray& array, size_t width) {
+    return std::ranges::equal(array.shape, std::array{times.size(), count, width}) ||
+           (count == 1 && std::ranges::equal(array.shape, std::array{times.size(), width}));
+  };
+  if (!has_shape(places, 3) || !has_shape(turns, 4)) {
     return Malformed(path, absl::StrCat("positions must be (", times.size(), ", ", count,
                                         ", 3) and orientations (", times.size(), ", ", count,
                                         ", 4), as times and bodies are"));

@@ -146,7 +146,9 @@ class FoleyTest(DaemonTest):
         self.assertAlmostEqual(sum(z for _, z in found), impulse, delta=1e-3 * impulse)
 
     def test_a_table_and_an_archive_give_the_impact_of_the_landing(self):
-        for file in ("fall.csv", "fall.npz"):
+        # The floor has no end.
+        self.write_poses("far.csv", [[time, body, x + 60, *rest] for time, body, x, *rest in self.rows])
+        for file in ("fall.csv", "fall.npz", "far.csv"):
             trace = self.folder / f"{file}.contacts"
             done = self.table(file, "--floor", 0, "--trace", trace)
             self.assertIn("unexplained", done.stderr)
@@ -225,6 +227,9 @@ class FoleyTest(DaemonTest):
                 self.refused("MOTION_MALFORMED", self.table(f"{name}.csv", *out, check=False), f"line {line} ")
         self.write_poses("names.csv", rows, "time,body,x,y,z,qw,qx,qy,qz")
         self.refused("MOTION_MALFORMED", self.table("names.csv", *out, check=False), "the column t ")
+        arrays = dict(numpy.load(self.folder / "fall.npz"))
+        numpy.savez(self.folder / "by_body.npz", **{**arrays, "positions": arrays["positions"].swapaxes(0, 1)})
+        self.refused("MOTION_MALFORMED", self.table("by_body.npz", *out, check=False), "positions must be ")
 
     def test_a_mass_of_the_file_scales_the_impulse(self):
         write_gltf(self.folder / "heavy.glb", mass=2 * MASS_KG)
