@@ -15,16 +15,20 @@ namespace {
 using Momentum = Eigen::Matrix<double, 6, 1>;  ///< linear, then angular
 using Index = Eigen::Index;
 
-constexpr int kPasses = 3, kSteps = 8;
+/// The motions of the bodies follow the blows after each of these corrections.
+constexpr int kCorrections = 3;
+/// The number of steps of Levenberg's and Marquardt's method in a correction.
+constexpr int kSteps = 8;
 /// A change of an impulse or of its time costs this share of the energy that it would explain.
 constexpr double kKeep = 0.01;
-/// Blows stay as they are if other solutions explain the motion as well without this share of them,
+/// A blow is not corrected if other solutions explain the motion as well without this share of it.
 constexpr double kMostAmbiguity = 0.3;
-/// if they have more unknowns than this share of the equations,
+/// A group is not corrected if it has more unknowns than this share of its equations.
 constexpr double kMostUnknown = 0.7;
-/// if two of a pair are within this share of a body's radius of each other,
+/// Blows of a pair are not corrected if they are within this share of a body's radius of each
+/// other.
 constexpr double kApart = 0.25;
-/// or if correction lowers the energy that they leave unexplained by less than this share.
+/// A correction counts if it lowers the unexplained energy of a group by this share at least.
 constexpr double kLeastGain = 0.1;
 /// Corners that cannot be told apart have one time if that leaves at most this share of their
 /// energy unexplained.
@@ -82,7 +86,7 @@ struct Group {
   size_t interval = 0;
   std::vector<size_t> bodies;  ///< those that are balanced
   std::vector<Node> nodes;
-  /// What the bodies knew before in the interval and its neighbours.
+  /// What the bodies knew before in the interval, and in neighbours in which nothing strikes them.
   std::map<std::pair<size_t, size_t>, std::vector<BodyImpulse>> known;
   double unexplained = 0, unexplained_as_read = 0;  ///< before correction, J
   double least_gain = 0;                            ///< by which correction must lower it, J
@@ -101,9 +105,9 @@ class Refinement {
         if (balanced(body)) impact.per_kg += 1 / bodies.motions[body].mass_kg();
       }
       impact.found = blow.balanced_newton_seconds;
-      const double frames = blow.balanced_s / motion.frame_s;
-      impact.found_frame = std::min(static_cast<size_t>(frames + 1e-9), motion.frame_count() - 2);
-      impact.found_share = std::max(0.0, frames - static_cast<double>(impact.found_frame));
+      const auto [frame, since_s] = FrameAt(blow.balanced_s, motion.frame_s, motion.frame_count());
+      impact.found_frame = frame;
+      impact.found_share = since_s / motion.frame_s;
       impacts_.push_back(impact);
     }
     FindGroups();
@@ -111,16 +115,16 @@ class Refinement {
 
   void Run() {
     ChooseForGroups();
-    for (int pass = 0; pass <= kPasses; ++pass) {
+    for (int pass = 0; pass <= kCorrections; ++pass) {
       SetArms();
       SetRows();
       for (Group& group : groups_) {
         const double energy = Residual(group).squaredNorm();
-        if (pass == kPasses && energy > group.unexplained - group.least_gain) Revert(group);
-        if (pass < kPasses) Improve(group);
+        if (pass == kCorrections && energy > group.unexplained - group.least_gain) Revert(group);
+        if (pass < kCorrections) Improve(group);
       }
       for (const Group& group : groups_) {
-        if (pass < kPasses) Tell(group);
+        if (pass < kCorrections) Tell(group);
       }
     }
     for (const Impact& impact : impacts_) {
@@ -131,7 +135,7 @@ class Refinement {
     std::erase_if(found_.blows,
                   [](const FoundBlow& blow) { return blow.impulse_newton_seconds.isZero(0); });
     std::ranges::stable_sort(found_.blows, {}, [this](const FoundBlow& blow) {
-      return static_cast<double>(blow.frame) * motion_.frame_s + blow.time_s;
+      return blow.SinceFirst(motion_.frame_s);
     });
   }
 
@@ -149,12 +153,11 @@ class Refinement {
       while (parent[i] != i) i = parent[i];
       return i;
     };
-    std::map<std::pair<size_t, size_t>, size_t>& first = struck_;
     for (size_t i = 0; i < impacts_.size(); ++i) {
       const FoundBlow& blow = *impacts_[i].blow;
       for (const uint32_t body : {blow.a, blow.b}) {
         if (!balanced(body)) continue;
-        const auto [other, is_new] = first.try_emplace({impacts_[i].found_frame, body}, i);
+        const auto [other, is_new] = struck_.try_emplace({impacts_[i].found_frame, body}, i);
         if (!is_new) parent[root(i)] = root(other->second);
       }
     }
@@ -212,7 +215,8 @@ class Refinement {
       for (size_t frame = group.interval - std::min<size_t>(group.interval, 1);
            frame <= group.interval + 2; ++frame) {
         if (!has_row(body, frame)) continue;
-        if (frame < group.interval + 2) {
+        if (frame == group.interval ||
+            (frame < group.interval + 2 && !struck_.contains({frame, body}))) {
           group.known[{body, frame}] = moves.known_impulses(frame);
         }
         group.nodes.push_back({.body = body,
@@ -261,11 +265,8 @@ class Refinement {
         const Vector f = impact.On(body);
         impulses.push_back({impact.share * motion_.frame_s, f, impact.ArmOf(body).cross(f)});
       }
-      if (interval == group.interval) {
-        bodies_.motions[body].Know(interval, impulses);
-      } else if (!struck_.contains({interval, body})) {
-        bodies_.motions[body].Know(interval, impulses.empty() ? known : impulses);
-      }
+      const bool may_be_as_before = impulses.empty() && interval != group.interval;
+      bodies_.motions[body].Know(interval, may_be_as_before ? known : impulses);
     }
   }
 
@@ -273,9 +274,7 @@ class Refinement {
     for (const size_t i : group.members) Take(impacts_[i], MayBeAsRead(group, kMostLost));
     for (const auto& [place, known] : group.known) {
       const auto& [body, interval] = place;
-      if (interval == group.interval || !struck_.contains({interval, body})) {
-        bodies_.motions[body].Know(interval, known);
-      }
+      bodies_.motions[body].Know(interval, known);
     }
   }
 
@@ -375,7 +374,7 @@ class Refinement {
     return derivatives;
   }
 
-  /// How far a group is from what was found, in the same unknowns.
+  /// Returns the differences of a group's unknowns from those that the balance found.
   Eigen::VectorXd Moved(const Group& group) const {
     Eigen::VectorXd moved(static_cast<Index>(4 * group.members.size()));
     for (size_t m = 0; m < group.members.size(); ++m) {

@@ -288,8 +288,7 @@ void ContactProblem::Tell(std::vector<BodyMotion>& motions) const {
       if (!balanced_[body]) continue;
       const Vector& arm = side > 0 ? c.arm_a : c.arm_b;
       if (c.blow()) {
-        const size_t frame = std::min(static_cast<size_t>(times[i] / frame_s_ + 1e-9), frames_ - 2);
-        const double since_s = std::max(0.0, times[i] - static_cast<double>(frame) * frame_s_);
+        const auto [frame, since_s] = FrameAt(times[i], frame_s_, frames_);
         impulses[body][frame].push_back({since_s, side * f, arm.cross(side * f)});
       } else {
         for (size_t k = c.frame; k <= c.last_frame; ++k) forces[body][k] += side * f;

@@ -31,13 +31,6 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// The frame at or before a time since the first frame, s, and the time since that frame, s.
-std::pair<size_t, double> FrameAt(const Motion& motion, double time_s) {
-  const double frames = time_s / motion.frame_s;
-  const size_t frame = std::min(static_cast<size_t>(frames + 1e-9), motion.frame_count() - 2);
-  return {frame, std::max(0.0, frames - static_cast<double>(frame)) * motion.frame_s};
-}
-
 /// The contacts of one pair while they are divided into blows and loads.
 class PairReading {
  public:
@@ -295,14 +288,11 @@ class PairReading {
     blow.impulse_newton_seconds = impulse;
     blow.point_a_m /= sum;
     blow.point_b_m /= sum;
-    std::tie(blow.frame, blow.time_s) = FrameOf(time_s);
+    std::tie(blow.frame, blow.time_s) = FrameAt(time_s, motion_.frame_s, forces_.size());
     blow.normal = pieces.front().candidate->feature.normal;
     if (blow.normal.dot(impulse) < 0) blow.normal = -blow.normal;
     found.blows.push_back(blow);
   }
-
-  /// The frame at or before a time since the first frame, s, and the time since that frame, s.
-  std::pair<size_t, double> FrameOf(double time_s) const { return FrameAt(motion_, time_s); }
 
   void AddLoad(size_t frame, const Piece& piece, FoundContacts& found) const {
     if (piece.impulse.isZero(0)) return;
@@ -384,9 +374,6 @@ FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
 
 void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_s,
                    FoundContacts& found) {
-  const auto time_of = [&motion](const FoundBlow& blow) {
-    return static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
-  };
   for (size_t i = 0; i < found.blows.size(); ++i) {
     FoundBlow& blow = found.blows[i];
     const auto orientation = [&](uint32_t body) {
@@ -394,18 +381,18 @@ void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_
     };
     blow.orientation_a = orientation(blow.a);
     blow.orientation_b = orientation(blow.b);
-    const double time_s = time_of(blow);
+    const double time_s = blow.SinceFirst(motion.frame_s);
     double before_s = std::max(0.0, time_s - bin_s);
-    for (size_t k = i; k-- > 0 && time_s - time_of(found.blows[k]) < 2 * bin_s;) {
+    for (size_t k = i; k-- > 0 && time_s - found.blows[k].SinceFirst(motion.frame_s) < 2 * bin_s;) {
       const FoundBlow& other = found.blows[k];
-      const double since_s = time_s - time_of(other);
+      const double since_s = time_s - other.SinceFirst(motion.frame_s);
       const bool shares =
           other.a == blow.a || other.a == blow.b || other.b == blow.a || other.b == blow.b;
       if (shares && since_s > kTogether * motion.frame_s) {
         before_s = std::max(before_s, time_s - since_s / 2);
       }
     }
-    const auto [frame, since_s] = FrameAt(motion, before_s);
+    const auto [frame, since_s] = FrameAt(before_s, motion.frame_s, motion.frame_count());
     const auto velocity = [&, frame = frame, since_s = since_s](uint32_t body, const Turn& turn,
                                                                 const Vector& point_m) {
       const BodyMotion& of_body = bodies.motions[body];

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace carillon::motion {
@@ -76,6 +77,13 @@ struct Motion {
   }
 };
 
+/// Returns the frame at or before a time since the first frame, s, and the time since that frame.
+inline std::pair<size_t, double> FrameAt(double time_s, double frame_s, size_t frame_count) {
+  const double frames = time_s / frame_s;
+  const size_t frame = std::min(static_cast<size_t>(frames + 1e-9), frame_count - 2);
+  return {frame, std::max(0.0, time_s - static_cast<double>(frame) * frame_s)};
+}
+
 /// A point of a contact between two bodies. Vectors act on body `a`, and their opposites on `b`.
 struct ContactPoint {
   uint32_t a = 0, b = 0;
@@ -86,6 +94,9 @@ struct ContactPoint {
 
 /// A blow.
 struct FoundBlow : ContactPoint {
+  /// The time since the first frame, s.
+  double SinceFirst(double frame_s) const { return static_cast<double>(frame) * frame_s + time_s; }
+
   double time_s = 0;                               ///< since frame `frame`
   Vector impulse_newton_seconds = Vector::Zero();  ///< in the scene's axes
   Vector normal = Vector::Zero();                  ///< towards a, in the scene's axes

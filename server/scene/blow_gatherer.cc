@@ -31,9 +31,6 @@ constexpr double kUndecidedS = 0.04;
 constexpr double kLoadS = 0.01;
 /// Blows that are farther apart than this are heard one by one, not as a tone.
 constexpr double kLastingS = 0.1;
-/// A body at rest gets the acceleration of gravity, 9.81 m/s^2, and twice that in each second step.
-/// In some games gravity is twice as great as on Earth.
-constexpr double kFeebleMPerS2 = 2.5 * 9.81;
 /// A contact that has lasted is a load without a blow if its impulses exceed the load in all by at
 /// most this number of steps of the load, or by this number of standard deviations of the sum of
 /// its steps: so much a solver's noise adds up to.
@@ -303,7 +300,7 @@ bool BlowGatherer::IsFeeble(const Pair& pair) {
   return std::ranges::all_of(GivenBy(pair.touches), [this](const Motion& given) {
     if (given.mass_kg == 0) return true;
     const Motion& sum = *std::ranges::lower_bound(motions_, given.handle, {}, &Motion::handle);
-    const double most = kFeebleMPerS2 * step_s_ * given.mass_kg;
+    const double most = kMostGravityMPerS2 * step_s_ * given.mass_kg;
     return Dot(sum.impulse, sum.impulse) <= most * most;
   });
 }
@@ -400,8 +397,8 @@ void BlowGatherer::EndBeforeLeap(Pair& pair, double force_newtons) {
 }
 
 void BlowGatherer::CountAsLoad(Blow& blow) {
-  for (const Stroke& stroke : blow.strokes) {
-    counts_.load_count += blow.steps.size() * stroke.touches.size();
+  for (const Place& place : blow.places) {
+    counts_.load_count += blow.steps.size() * place.touches.size();
   }
   blow.steps.clear();
 }
@@ -446,46 +443,44 @@ void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
     pair.blow_before_last_s = std::exchange(pair.last_blow_s, time_s_);
     blow.greatest = 0;
     blow.only_feeble = true;
-    blow.strokes.clear();
+    blow.places.clear();
   }
   blow.steps.push_back({.impulse = impulse, .force = force_newtons, .time_s = *time_s_});
   blow.greatest = std::max(blow.greatest, impulse);
   blow.only_feeble = blow.only_feeble && IsFeeble(pair);
-  AddToStrokes(blow, pair.touches, impulse / (force_newtons * step_s_));
+  AddToPlaces(blow, pair.touches, impulse / (force_newtons * step_s_));
 }
 
-void BlowGatherer::AddToStrokes(Blow& blow, std::span<const PairTouch> touches,
-                                double share) const {
+void BlowGatherer::AddToPlaces(Blow& blow, std::span<const PairTouch> touches, double share) const {
   const size_t step = blow.steps.size() - 1;
-  const size_t known_count = blow.strokes.size();
-  std::vector<std::vector<PairTouch>> by_stroke(known_count);
+  const size_t known_count = blow.places.size();
+  std::vector<std::vector<PairTouch>> by_place(known_count);
   for (const PairTouch& touch : touches) {
-    const auto found = std::ranges::find_if(blow.strokes, [&touch](const Stroke& stroke) {
-      return IsAtOnePlace(stroke.latest, touch);
-    });
-    const auto at = static_cast<size_t>(found - blow.strokes.begin());
-    if (found == blow.strokes.end()) {
-      blow.strokes.push_back({.latest = touch});
-      by_stroke.emplace_back();
+    const auto found = std::ranges::find_if(
+        blow.places, [&touch](const Place& place) { return IsAtOnePlace(place.latest, touch); });
+    const auto at = static_cast<size_t>(found - blow.places.begin());
+    if (found == blow.places.end()) {
+      blow.places.push_back({.latest = touch});
+      by_place.emplace_back();
     }
-    blow.strokes[at].impulses.resize(step + 1);
-    blow.strokes[at].impulses[step] += share * touch.magnitude;
-    by_stroke[at].push_back(touch);
+    blow.places[at].impulses.resize(step + 1);
+    blow.places[at].impulses[step] += share * touch.magnitude;
+    by_place[at].push_back(touch);
   }
   std::vector<PairTouch> begin;
-  for (size_t at = 0; at < by_stroke.size(); ++at) {
-    Stroke& stroke = blow.strokes[at];
-    if (by_stroke[at].empty()) continue;
-    if (at >= known_count) std::ranges::copy(by_stroke[at], std::back_inserter(begin));
-    stroke.latest = by_stroke[at].front();
-    if (!stroke.touches.empty() && stroke.impulses[step] <= stroke.greatest()) continue;
-    stroke.strongest = step;
-    stroke.touches = std::move(by_stroke[at]);
+  for (size_t at = 0; at < by_place.size(); ++at) {
+    Place& place = blow.places[at];
+    if (by_place[at].empty()) continue;
+    if (at >= known_count) std::ranges::copy(by_place[at], std::back_inserter(begin));
+    place.latest = by_place[at].front();
+    if (!place.touches.empty() && place.impulses[step] <= place.greatest()) continue;
+    place.strongest = step;
+    place.touches = std::move(by_place[at]);
   }
   if (begin.empty()) return;
   const double approach_m_per_s = ApproachSpeed(begin);
-  for (Stroke& stroke : std::span(blow.strokes).subspan(known_count)) {
-    stroke.approach_m_per_s = approach_m_per_s;
+  for (Place& place : std::span(blow.places).subspan(known_count)) {
+    place.approach_m_per_s = approach_m_per_s;
   }
 }
 
@@ -503,14 +498,12 @@ bool BlowGatherer::IsAtOnePlace(const PairTouch& one, const PairTouch& other) {
 }
 
 bool BlowGatherer::StrikesElsewhere(const Pair& pair) {
-  if (pair.blow.strokes.empty() || IsFeeble(pair)) return false;
+  if (pair.blow.places.empty() || IsFeeble(pair)) return false;
   double known = 0, all = 0;
   for (const PairTouch& touch : pair.touches) {
     all += touch.magnitude;
-    const auto is_near = [&touch](const Stroke& stroke) {
-      return IsAtOnePlace(stroke.latest, touch);
-    };
-    if (std::ranges::any_of(pair.blow.strokes, is_near)) known += touch.magnitude;
+    const auto is_near = [&touch](const Place& place) { return IsAtOnePlace(place.latest, touch); };
+    if (std::ranges::any_of(pair.blow.places, is_near)) known += touch.magnitude;
   }
   return known < all / 2;
 }
@@ -573,19 +566,19 @@ void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
 }
 
 std::vector<BlowGatherer::Impact> BlowGatherer::ImpactsOf(const Blow& blow, double share) {
-  std::vector<const Stroke*> left;
-  for (const Stroke& stroke : blow.strokes) left.push_back(&stroke);
+  std::vector<const Place*> left;
+  for (const Place& place : blow.places) left.push_back(&place);
   std::vector<Impact> impacts;
   while (!left.empty()) {
-    const Stroke& strongest = **std::ranges::max_element(left, {}, &Stroke::greatest);
+    const Place& strongest = **std::ranges::max_element(left, {}, &Place::greatest);
     Impact impact{.step = strongest.strongest};
-    std::erase_if(left, [&](const Stroke* stroke) {
-      if (stroke->impulse_in(impact.step) < kTogether * stroke->greatest()) return false;
-      if (impact.strikes.empty()) impact.approach_m_per_s = stroke->approach_m_per_s;
+    std::erase_if(left, [&](const Place* place) {
+      if (place->impulse_in(impact.step) < kTogether * place->greatest()) return false;
+      if (impact.strikes.empty()) impact.approach_m_per_s = place->approach_m_per_s;
       double of_place = 0, of_touches = 0;
-      for (const double of_step : stroke->impulses) of_place += share * of_step;
-      for (const PairTouch& touch : stroke->touches) of_touches += touch.magnitude;
-      for (const PairTouch& touch : stroke->touches) {
+      for (const double of_step : place->impulses) of_place += share * of_step;
+      for (const PairTouch& touch : place->touches) of_touches += touch.magnitude;
+      for (const PairTouch& touch : place->touches) {
         impact.strikes.push_back({.touch = &touch, .scale = of_place / of_touches});
       }
       return true;

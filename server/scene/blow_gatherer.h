@@ -193,7 +193,7 @@ class BlowGatherer {
     std::array<double, 3> impulse{};
   };
   /// A place that a blow strikes.
-  struct Stroke {
+  struct Place {
     std::vector<double> impulses{};    // above the load in each step of the blow, N s
     size_t strongest = 0;              // index of the step with the greatest impulse
     std::vector<PairTouch> touches{};  // touches of that step
@@ -213,11 +213,11 @@ class BlowGatherer {
     double load_newtons = 0;  // load before the blow
     double greatest = 0;      // impulse of its strongest step, N s
     std::vector<Step> steps{};
-    std::vector<Stroke> strokes{};  // in the order in which they began
-    bool lasting = false;           // whether the bodies touched here shortly before the blow
-    bool feeble = false;            // whether its first step may have been a load
-    bool only_feeble = true;        // whether all of its steps may have been a load
-    int lost_steps = 0;             // steps since a feeble blow lost its contact
+    std::vector<Place> places{};  // in the order in which they began
+    bool lasting = false;         // whether the bodies touched here shortly before the blow
+    bool feeble = false;          // whether its first step may have been a load
+    bool only_feeble = true;      // whether all of its steps may have been a load
+    int lost_steps = 0;           // steps since a feeble blow lost its contact
 
     bool begun() const { return !steps.empty(); }
     double begin_s() const { return steps.front().time_s; }
@@ -235,7 +235,7 @@ class BlowGatherer {
     double approach_m_per_s = 0;
     std::vector<Strike> strikes{};
   };
-  /// Divides the strokes of a blow, with this share of their impulses, into impacts in order of
+  /// Divides the places of a blow, with this share of their impulses, into impacts in order of
   /// their steps.
   static std::vector<Impact> ImpactsOf(const Blow& blow, double share);
   static bool IsAtOnePlace(const PairTouch& one, const PairTouch& other);
@@ -247,6 +247,7 @@ class BlowGatherer {
     std::span<const PairTouch> touches{};            // of this step, in touches_
     std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
     std::array<Motion, 2> given{};                   // what it gave its objects in the last touch
+    // The times at which the last two blows began.
     std::optional<double> last_blow_s = std::nullopt, blow_before_last_s = std::nullopt;
     Blow blow{};
   };
@@ -279,8 +280,8 @@ class BlowGatherer {
   /// Adds a step's force to the time for which a feeble blow has lost its contact. Returns whether
   /// the contact returns before the blow is over, so that there was no blow.
   bool Flickers(Blow& blow, double force_newtons);
-  /// Ends a pair's blow if the force of this step is no growth of its own, but a leap: what was
-  /// gathered is a load, such as that of a body that was just laid down, or a blow of its own.
+  /// Ends a pair's blow if the force of this step leaps far above the forces that were gathered.
+  /// These were a load, such as that of a body that was just laid down, or a blow of their own.
   void EndBeforeLeap(Pair& pair, double force_newtons);
   /// Ends what turned out to be a load.
   void CountAsLoad(Blow& blow);
@@ -290,8 +291,8 @@ class BlowGatherer {
   /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
   /// first step.
   void Gather(Pair& pair, double force_newtons, double impulse);
-  /// Adds a step's touches to the strokes of a blow, each with this share of its impulse.
-  void AddToStrokes(Blow& blow, std::span<const PairTouch> touches, double share) const;
+  /// Adds a step's touches to the places of a blow, each with this share of its impulse.
+  void AddToPlaces(Blow& blow, std::span<const PairTouch> touches, double share) const;
   /// Returns whether the blow is over in this step, which has the given force and impulse above the
   /// load and may strike `elsewhere`. If a load remains, `remains` is set to its force.
   bool IsOver(const Blow& blow, double force_newtons, double impulse, bool elsewhere,

@@ -7,12 +7,6 @@
 #include "server/synthesis/voice/vector3.h"
 
 namespace carillon {
-namespace {
-
-/// In some games gravity is twice as great as on Earth.
-constexpr double kMostGainMPerS2 = 2.5 * 9.81;
-
-}  // namespace
 
 void RecentPoses::Begin(double time_s, bool follows) {
   if (!follows || paths_.size() > kMostObjects) paths_.clear();
@@ -66,7 +60,7 @@ std::optional<double> RecentPoses::ApproachSpeed(std::span<const Ray> rays) cons
   const std::optional<double> now = Speed(rays, 0), before = Speed(rays, 1);
   if (!before) return std::nullopt;
   const double gained = *before - Speed(rays, 2).value_or(*before);
-  const double most = kMostGainMPerS2 * (times_s_[1] - times_s_[2]);
+  const double most = kMostGravityMPerS2 * (times_s_[1] - times_s_[2]);
   return std::max(now.value_or(*before), *before) + (std::abs(gained) <= most ? gained : 0);
 }
 

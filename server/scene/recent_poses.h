@@ -12,6 +12,11 @@
 
 namespace carillon {
 
+/// Gravity changes the speed of a body in a step by no more than this, m/s^2. A body at rest gets
+/// the acceleration of gravity, and twice that in each second step; in some games gravity is twice
+/// as great as on Earth.
+inline constexpr double kMostGravityMPerS2 = 2.5 * 9.81;
+
 /// The poses of objects in the last steps of a simulation, from which the speed of a point of an
 /// object before a blow follows.
 class RecentPoses {
