@@ -557,6 +557,7 @@ void BlowGatherer::SendBlow(Pair& pair, double remains_newtons) {
   const double above_load = ImpulseAbove(blow, 0);
   const double share = ImpulseAbove(blow, remains_newtons) / above_load;
   if (!(share > kRounding)) return CountAsLoad(blow);
+  ++counts_.blow_count;
   const std::vector<Impact> impacts = ImpactsOf(blow, share);
   const double first_s = blow.steps[impacts.front().step].time_s;
   for (const Impact& impact : impacts) {
@@ -590,7 +591,6 @@ std::vector<BlowGatherer::Impact> BlowGatherer::ImpactsOf(const Blow& blow, doub
 }
 
 void BlowGatherer::SendImpact(const Pair& pair, const Impact& impact, double later_s) {
-  ++counts_.blow_count;
   std::map<uint32_t, double> by_vertex;
   double whole = 0, squares = 0;
   for (const Strike& strike : impact.strikes) {
