@@ -83,6 +83,7 @@ void ContactRows::Append(const ContactReport& contact, v1::ContactStep& step) {
   row.set_partner(PartnerNumber(other.body));
   Set(*row.mutable_point_m(), first.point_m);
   Set(*row.mutable_impulse_newton_seconds(), Rotate(Inverse(first.orientation), impulse));
+  Set(*row.mutable_normal(), Rotate(Inverse(first.orientation), contact.normal));
   if (settings_.duration_s) row.set_duration_s(*settings_.duration_s);
   row.mutable_roughness()->set_travel_speed_m_per_s(TravelSpeed(contact));
   row.mutable_roughness()->set_depth(settings_.roughness_depth);

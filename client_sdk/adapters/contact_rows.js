@@ -83,7 +83,7 @@ class ContactRows {
       return this.rows({ first: second, second: first, point: pointOnSecond, pointOnSecond: point,
         normal, impulse: times(impulse, -1) });
     }
-    const row = { object: one, partner: this.partnerNumber(second.key), point, impulse };
+    const row = { object: one, partner: this.partnerNumber(second.key), point, impulse, normal };
     if (this.settings.roughness) {
       const { depth, irregularityLengthM } = this.settings.roughness;
       row.roughness = { depth, travelSpeedMPerS: travelSpeed(contact) };

@@ -36,9 +36,10 @@ class DartContacts:
         poses = [pose for _, _, pose in self._objects.values()]
         step = {}
         if rows:
-            objects, partners, points, impulses, seconds, speeds = map(numpy.array, zip(*rows))
+            objects, partners, points, impulses, normals, seconds, speeds = map(numpy.array, zip(*rows))
             step["contacts"] = carillon.Contacts(objects, points, impulses, partners=partners, second_objects=seconds,
-                                                 second_points=points, travel_speeds=speeds, **self._settings)
+                                                 second_points=points, normals=normals, travel_speeds=speeds,
+                                                 **self._settings)
         if poses:
             step["poses"] = carillon.Poses([handle for _, handle, _ in self._objects.values()],
                                            *map(numpy.array, zip(*poses)))
@@ -55,9 +56,9 @@ class DartContacts:
             return None
         if not handles[0] or 0 < handles[1] < handles[0]:
             bodies, handles, impulse = bodies[::-1], handles[::-1], -impulse
-        point = numpy.array(contact.point)
-        return (handles[0], self._partner(_key(bodies[1])), point, impulse, handles[1],
-                _travel_speed(bodies, point, numpy.array(contact.normal)))
+        point, normal = numpy.array(contact.point), numpy.array(contact.normal)
+        return (handles[0], self._partner(_key(bodies[1])), point, impulse, normal, handles[1],
+                _travel_speed(bodies, point, normal))
 
     def _partner(self, key):
         if key not in self._partners:

@@ -67,6 +67,8 @@ absl::Status Set(const carillon_contact& from, v1::Contact& to) {
   }
   to.set_partner(from.partner);
   if (from.duration_s != 0) to.set_duration_s(from.duration_s);
+  const carillon_vec3& normal = from.normal;
+  if (normal.x != 0 || normal.y != 0 || normal.z != 0) Set(normal, *to.mutable_normal());
   if (from.travel_speed_m_per_s == 0) return absl::OkStatus();
   to.mutable_roughness()->set_travel_speed_m_per_s(from.travel_speed_m_per_s);
   to.mutable_roughness()->set_depth(from.roughness_depth);

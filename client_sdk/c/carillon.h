@@ -91,6 +91,7 @@ typedef struct carillon_contact {
   double duration_s; /**< of an impact; zero: as long as the collision of two elastic bodies */
   double travel_speed_m_per_s; /**< along a rough surface; zero: no roughness */
   double roughness_depth;      /**< relative to the force */
+  carillon_vec3 normal;        /**< of the surfaces, of any length; zero: that of the impulse */
 } carillon_contact;
 
 /** The place and the rotation of an object, or of the listener, in the scene's frame. */

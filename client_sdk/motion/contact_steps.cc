@@ -48,6 +48,9 @@ class StepMaker {
     row->set_kind(v1::CONTACT_KIND_IMPACT);
     row->set_time_offset_s(blow.time_s);
     Set(*row->mutable_impulse_newton_seconds(), impulse);
+    const bool swapped = row->object() != settings_.handles[blow.a];
+    Set(*row->mutable_normal(),
+        (swapped ? blow.orientation_b : blow.orientation_a).conjugate() * blow.normal);
     if (blow.approach_m_per_s > 0) {
       row->mutable_hertz()->set_approach_speed_m_per_s(blow.approach_m_per_s);
     }

@@ -70,19 +70,21 @@ v1::ErrorInfo ToErrorInfo(const absl::Status& status) {
   return error;
 }
 
-absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index) {
+absl::Status About(absl::string_view about, absl::string_view figure, absl::string_view value,
+                   const absl::Status& status) {
   v1::ErrorInfo error = ToErrorInfo(status);
-  error.set_message(absl::StrCat(list, "[", index, "]: ", error.message()));
-  (*error.mutable_metadata())["index"] = absl::StrCat(index);
+  error.set_message(absl::StrCat(about, ": ", error.message()));
+  (*error.mutable_metadata())[std::string(figure)] = std::string(value);
   return FromErrorInfo(status.code(), error);
 }
 
+absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index) {
+  return About(absl::StrCat(list, "[", index, "]"), "index", absl::StrCat(index), status);
+}
+
 absl::Status AtTime(const absl::Status& status, double time_s) {
-  v1::ErrorInfo error = ToErrorInfo(status);
   const std::string time = ShortestDecimal(time_s);
-  error.set_message(absl::StrCat("at ", time, " s: ", error.message()));
-  (*error.mutable_metadata())["time_s"] = time;
-  return FromErrorInfo(status.code(), error);
+  return About(absl::StrCat("at ", time, " s"), "time_s", time, status);
 }
 
 absl::Status FromErrorInfo(absl::StatusCode code, const v1::ErrorInfo& error) {

@@ -17,6 +17,10 @@ absl::Status Refusal(absl::StatusCode code, absl::string_view reason, absl::stri
 /// Adds a figure that belongs to the reason, for programs ("first_mode_hz" = "31.5").
 void AddFigure(absl::Status& status, absl::string_view name, absl::string_view value);
 
+/// Returns the same refusal with what it is about, "REASON: about: message", and with a figure.
+absl::Status About(absl::string_view about, absl::string_view figure, absl::string_view value,
+                   const absl::Status& status);
+
 /// Returns the same refusal for element `index` of a list, "REASON: list[index]: message", with the
 /// figure "index".
 absl::Status AtElement(const absl::Status& status, absl::string_view list, size_t index);

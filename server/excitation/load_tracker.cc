@@ -38,6 +38,10 @@ bool LoadTracker::has_blows() const {
   return std::ranges::any_of(blows_newtons_, [](double blow) { return blow > 0; });
 }
 
+bool LoadTracker::rests() const {
+  return !has_blows() && std::ranges::all_of(forces_newtons_, [](double f) { return f > 0; });
+}
+
 bool LoadTracker::idle() const { return empty_count_ >= kStepCount; }
 
 double LoadTracker::Usual() const {

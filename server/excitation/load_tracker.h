@@ -25,19 +25,23 @@ class LoadTracker {
   /// part of the impulse that is a blow, 0 to 1.
   double Next(double impulse_newton_seconds, double step_s);
 
+  /// Returns the usual force, newtons.
+  double Usual() const;
+
   /// Returns whether a remembered step had a blow.
   bool has_blows() const;
 
   /// Counts the blows of the remembered steps for nothing, as after a flight.
   void ForgetBlows();
 
+  /// Returns whether all remembered steps had a load and no blow.
+  bool rests() const;
+
   /// Returns whether all remembered steps were without contact, so that a new tracker would behave
   /// alike.
   bool idle() const;
 
  private:
-  double Usual() const;
-
   std::array<double, kStepCount> forces_newtons_{};
   std::array<double, kStepCount> blows_newtons_{};  // the parts of these that were blows
   size_t empty_count_ = kStepCount;                 // steps since the last contact, at most these

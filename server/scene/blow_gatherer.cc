@@ -50,6 +50,8 @@ constexpr double kLostS = 0.01;
 /// A load continues with another partner if the cosine of its change of direction is greater than
 /// this, and if it does not grow more than the jitter of a load, see LoadTracker.
 constexpr double kLeastCosine = 0.7, kMostGrowth = 3;
+/// A longer gap than this is no stutter, seconds. Games limit their steps to about 1/3 s.
+constexpr double kLongestStutterS = 0.5;
 /// A blow grows by less than kMostGrowth from one step to the next after this number of steps.
 constexpr size_t kLeastBeforeLeap = 2;
 
@@ -95,6 +97,7 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
 void BlowGatherer::EndBeforeGap(double missing_count) {
   int steps = 0;
   step_s_ = nominal_step_s_;
+  for (Pair& pair : pairs_) pair.before_gap = pair.load;
   for (; steps < missing_count && ((steps < kKnotsToEnd && !objects_.empty()) || gathers());
        ++steps) {
     *time_s_ += step_s_;
@@ -141,11 +144,13 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
                                        .serial = on_body.serial,
                                        .impulse = on_body.impulse(),
                                        .point_m = on_body.point_m,
+                                       .pressing = on_body.pressing,
                                        .turn = on_body.turn,
                                        .collision = on_body.collision};
     added.reach_m = std::min(added.reach_m, kReach * on_body.extent_m);
   }
   added.magnitude = Magnitude(added.parts[0].impulse.impulse_newton_seconds);
+  added.pressing = std::sqrt(Dot(added.parts[0].pressing, added.parts[0].pressing));
   added.roughness = touch.roughness;
   added.time_offset_s = touch.time_offset_s;
   added.duration_follows_impulse = impulse.duration_follows_impulse;
@@ -338,9 +343,22 @@ bool BlowGatherer::gathers() const {
   return std::ranges::any_of(pairs_, [](const Pair& pair) { return pair.blow.begun(); });
 }
 
+bool BlowGatherer::ContinuesAfterGap(Pair& pair, double impulse) const {
+  if (follows_ || impulse == 0 || gap_s_ > kLongestStutterS) return false;
+  if (pair.blow.begun() || !pair.before_gap.rests()) return false;
+  LoadTracker load = pair.before_gap;
+  if (load.Next(impulse, gap_s_) > 0 || impulse < gap_s_ * load.Usual() / kMostGrowth) return false;
+  pair.load = load;
+  return true;
+}
+
 void BlowGatherer::Divide(Pair& pair) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) impulse += touch.magnitude;
+  if (ContinuesAfterGap(pair, impulse)) {
+    counts_.load_count += pair.touches.size();
+    return EndTouches(pair, 1 / gap_s_);
+  }
   const double force = impulse / step_s_;
   const bool elsewhere = pair.load.has_blows() && StrikesElsewhere(pair);
   if (elsewhere) pair.load.ForgetBlows();
@@ -374,10 +392,14 @@ void BlowGatherer::Divide(Pair& pair) {
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
   if (undecided) share = 0;
+  EndTouches(pair, (1 - share) / step_s_);
+}
+
+void BlowGatherer::EndTouches(Pair& pair, double per_second) {
   for (const PairTouch& touch : pair.touches) {
-    for (const Part& part : touch.all()) Add(part, (1 - share) / step_s_, touch.roughness);
+    for (const Part& part : touch.all()) Add(part, per_second, touch.roughness);
   }
-  if (force > 0) {
+  if (!pair.touches.empty()) {
     pair.touched_s = time_s_;
     pair.given = GivenBy(pair.touches);
   }
@@ -417,11 +439,8 @@ double BlowGatherer::ApproachSpeed(std::span<const PairTouch> touches) const {
     std::array<RecentPoses::Ray, 2> rays{};
     for (size_t i = 0; i < touch.part_count; ++i) {
       const Part& part = touch.parts[i];
-      rays[i] = {.handle = part.handle, .point_m = part.point_m};
-      const auto& impulse = part.impulse.impulse_newton_seconds;
-      for (size_t axis = 0; axis < impulse.size(); ++axis) {
-        rays[i].direction[axis] = double{impulse[axis]} / touch.magnitude;
-      }
+      rays[i] = {.handle = part.handle, .point_m = part.point_m, .direction = part.pressing};
+      for (double& component : rays[i].direction) component /= touch.pressing;
     }
     const std::optional<double> speed =
         poses_.ApproachSpeed(std::span(rays).first(touch.part_count));
@@ -598,7 +617,7 @@ void BlowGatherer::SendImpact(const Pair& pair, const Impact& impact, double lat
     whole += strike.impulse();
   }
   for (const auto& [vertex, impulse] : by_vertex) squares += impulse * impulse;
-  const Collision collision = CollisionOf(impact, whole);
+  const Collision collision = CollisionOf(impact);
   for (const Strike& strike : impact.strikes) {
     const BlowShares shares{.scale = strike.scale,
                             .of_blow = strike.impulse() / whole,
@@ -612,18 +631,19 @@ void BlowGatherer::SendImpact(const Pair& pair, const Impact& impact, double lat
   }
 }
 
-Collision BlowGatherer::CollisionOf(const Impact& impact, double impulse) {
+Collision BlowGatherer::CollisionOf(const Impact& impact) {
   const PairTouch& first = *impact.strikes.front().touch;
-  double masses = 0;
-  for (const Strike& strike : impact.strikes) {
-    masses += strike.impulse() * strike.touch->parts[0].collision.reduced_mass_kg;
+  double masses = 0, impulse = 0;
+  for (const auto& [touch, scale] : impact.strikes) {
+    impulse += scale * touch->pressing;
+    masses += scale * touch->pressing * touch->parts[0].collision.reduced_mass_kg;
   }
   double per_kg = first.striker_per_kg.value_or(0);
   for (size_t i = 0; i < first.part_count; ++i) {
     Vector3 push{}, turn{};
     for (const auto& [touch, scale] : impact.strikes) {
       for (size_t axis = 0; axis < push.size(); ++axis) {
-        push[axis] += scale * double{touch->parts[i].impulse.impulse_newton_seconds[axis]};
+        push[axis] += scale * touch->parts[i].pressing[axis];
         turn[axis] += scale * touch->parts[i].turn[axis];
       }
     }
@@ -660,8 +680,8 @@ ForceEvent BlowGatherer::PartOfBlow(const PairTouch& touch, size_t which,
     longer *= std::pow(mass / collision.reduced_mass_kg * shares.of_mass, kMassPower);
     if (touch.duration_follows_impulse) {
       // The duration was computed for the speed of the touch alone.
-      const double alone = touch.magnitude / (2 * collision.reduced_mass_kg);
-      const double elastic = shares.scale * touch.magnitude / shares.of_blow / (2 * mass);
+      const double alone = touch.pressing / (2 * collision.reduced_mass_kg);
+      const double elastic = shares.scale * touch.pressing / shares.of_blow / (2 * mass);
       const double speed = shares.speed_m_per_s > 0 ? shares.speed_m_per_s : elastic;
       longer *= std::pow(speed / alone, kDurationPower);
       collision.stated_speed_m_per_s = shares.speed_m_per_s;

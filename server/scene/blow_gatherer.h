@@ -67,6 +67,8 @@ struct ForceEvent {
 ///
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.
+/// A game that stutters takes one long step instead. Therefore, if a pair rested before a gap of up
+/// to half a second, an impulse that fits its load for the length of the gap is still its load.
 ///
 /// An impulse that changes the speed of its bodies by hardly more than gravity does in a step may
 /// be the load of a body that rests when the simulation begins, or whose contact flickers. In the
@@ -157,8 +159,9 @@ class BlowGatherer {
     double mass_kg = 1;  // of the object
     uint64_t serial = 0;
     SurfaceImpulse impulse;
-    Vector3 point_m{};  // in the object's frame
-    Vector3 turn{};     // as in BodyImpulse
+    Vector3 point_m{};   // in the object's frame
+    Vector3 pressing{};  // as in BodyImpulse
+    Vector3 turn{};      // as in BodyImpulse
     Collision collision{};
   };
   struct PairTouch {
@@ -166,6 +169,7 @@ class BlowGatherer {
     std::array<Part, 2> parts{};
     size_t part_count = 0;
     double magnitude = 0;  // of the first object's impulse, N s
+    double pressing = 0;   // of its part along the normal, N s
     double reach_m = 0;    // how far apart contacts at one place may be
     Roughness roughness;
     double time_offset_s = 0;
@@ -239,14 +243,15 @@ class BlowGatherer {
   /// their steps.
   static std::vector<Impact> ImpactsOf(const Blow& blow, double share);
   static bool IsAtOnePlace(const PairTouch& one, const PairTouch& other);
-  /// Returns the mass and the speed of the collision that an impact of this impulse, N s, is.
-  static Collision CollisionOf(const Impact& impact, double impulse);
+  /// Returns the mass and the speed of the collision that an impact is.
+  static Collision CollisionOf(const Impact& impact);
   struct Pair {
     Bodies bodies;
     LoadTracker load{};
     std::span<const PairTouch> touches{};            // of this step, in touches_
     std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
     std::array<Motion, 2> given{};                   // what it gave its objects in the last touch
+    LoadTracker before_gap{};                        // the load when the steps ceased
     // The times at which the last two blows began.
     std::optional<double> last_blow_s = std::nullopt, blow_before_last_s = std::nullopt;
     Blow blow{};
@@ -275,11 +280,15 @@ class BlowGatherer {
   void Add(const Part& part, double per_second, const Roughness& roughness);
   /// Sends the forces of this step, and each object's knot.
   void SendForces();
+  /// Returns whether a pair that touches after a gap rested all the time, and lets its load go on.
+  bool ContinuesAfterGap(Pair& pair, double impulse) const;
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(Pair& pair);
   /// Adds a step's force to the time for which a feeble blow has lost its contact. Returns whether
   /// the contact returns before the blow is over, so that there was no blow.
   bool Flickers(Blow& blow, double force_newtons);
+  /// Adds the touches of this step, whose impulses times `per_second` are forces, and forgets them.
+  void EndTouches(Pair& pair, double per_second);
   /// Ends a pair's blow if the force of this step leaps far above the forces that were gathered.
   /// These were a load, such as that of a body that was just laid down, or a blow of their own.
   void EndBeforeLeap(Pair& pair, double force_newtons);

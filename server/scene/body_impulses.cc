@@ -91,8 +91,7 @@ Vector3 TurnOf(const SoundingObject& object, const Vector3& point_m, const Vecto
 /// Returns the mass of the point that an impulse strikes: the impulse squared over twice the energy
 /// that it gives the object.
 double MassAtPointKg(const BodyImpulse& on_body) {
-  const auto& [x, y, z] = on_body.impulse().impulse_newton_seconds;
-  const double squared = double{x} * x + double{y} * y + double{z} * z;
+  const double squared = Dot(on_body.pressing, on_body.pressing);
   const double turn = Dot(on_body.turn, on_body.turn);
   return squared > 0 ? 1 / (1 / on_body.mass_kg + turn / squared) : on_body.mass_kg;
 }
@@ -117,9 +116,22 @@ ElasticBody ElasticBodyAt(const SoundingObject& object, const LocatedPoint& loca
 
 double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1], vector[2]); }
 
+/// Returns the part of an impulse along the contact's normal, or the impulse if there is no normal
+/// or one that cannot be right.
+Vector3 PressingPart(const ContactImpulse& contact) {
+  constexpr double kLeastAlong = 0.1;  // no friction is ten times the load
+  const Vector3& impulse = contact.impulse_newton_seconds;
+  if (!contact.normal) return impulse;
+  Vector3 part = *contact.normal;
+  const double along = Dot(impulse, part), squared = Dot(part, part);
+  if (along * along < kLeastAlong * kLeastAlong * squared * Dot(impulse, impulse)) return impulse;
+  for (double& component : part) component *= along / squared;
+  return part;
+}
+
 /// Fills in the impulse on one object, except for its pulse.
 void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vector3& impulse,
-            BodyImpulse& on_body) {
+            const Vector3& pressing, BodyImpulse& on_body) {
   const auto narrow = [](double x) { return static_cast<float>(x); };
   SurfaceImpulse surface{.at = {.vertices = located.vertices}};
   std::ranges::transform(located.weights, surface.at.weights.begin(), narrow);
@@ -131,7 +143,8 @@ void FillIn(const SoundingObject& object, const LocatedPoint& located, const Vec
   on_body.mass_kg = MassKg(object);
   on_body.point_m = object.body->At(located);
   for (double& coordinate : on_body.point_m) coordinate *= material.size;
-  on_body.turn = TurnOf(object, on_body.point_m, impulse);
+  on_body.pressing = pressing;
+  on_body.turn = TurnOf(object, on_body.point_m, pressing);
   on_body.serial = object.serial;
   on_body.largest_newton_seconds =
       10 * on_body.mass_kg * std::sqrt(material.young_pa / material.density_kg_per_m3);
@@ -144,11 +157,11 @@ void SetDuration(double duration_s, BodyImpulses& impulses) {
   }
 }
 
-/// Returns the opposite impulse in the frame of the second object.
-Vector3 OppositeImpulse(const ObjectContact& contact, const SoundingObject& object,
-                        const SoundingObject& second) {
+/// Returns the opposite of a part of the impulse, in the frame of the second object.
+Vector3 Opposite(const Vector3& impulse, const ObjectContact& contact, const SoundingObject& object,
+                 const SoundingObject& second) {
   const Quaternion rotation = contact.second->rotation.value_or(RotationBetween(object, second));
-  Vector3 opposite = Rotated(contact.impulse.impulse_newton_seconds, Normalized(rotation));
+  Vector3 opposite = Rotated(impulse, Normalized(rotation));
   std::ranges::transform(opposite, opposite.begin(), std::negate());
   return opposite;
 }
@@ -171,15 +184,17 @@ absl::Status FindBodyImpulses(const ObjectContact& contact, PointSource source,
                    locate(object, impulse.location, impulse.impulse_newton_seconds));
   impulses.by[0].handle = contact.handle;
   impulses.count = 1;
-  FillIn(object, located, impulse.impulse_newton_seconds, impulses.by[0]);
+  const Vector3 pressing = PressingPart(impulse);
+  FillIn(object, located, impulse.impulse_newton_seconds, pressing, impulses.by[0]);
   ElasticBody striker = kSteelTip;
   if (second != nullptr) {
-    const Vector3 opposite = OppositeImpulse(contact, object, *second);
+    const Vector3 opposite = Opposite(impulse.impulse_newton_seconds, contact, object, *second);
     ASSIGN_OR_RETURN(const LocatedPoint& on_second,
                      locate(*second, contact.second->location, opposite));
     impulses.by[1].handle = contact.second->handle;
     impulses.count = 2;
-    FillIn(*second, on_second, opposite, impulses.by[1]);
+    FillIn(*second, on_second, opposite, Opposite(pressing, contact, object, *second),
+           impulses.by[1]);
     striker = ElasticBodyAt(*second, on_second, impulses.by[1]);
   }
   if (impulse.duration_s) {
@@ -198,9 +213,7 @@ absl::Status FindBodyImpulses(const ObjectContact& contact, PointSource source,
     impulses.striker_per_kg =
         knows ? std::optional(1 / *impulse.hertz.striker_mass_kg) : std::nullopt;
   }
-  SetDuration(
-      HertzDurationS(struck, striker, impulse.hertz, Magnitude(impulse.impulse_newton_seconds)),
-      impulses);
+  SetDuration(HertzDurationS(struck, striker, impulse.hertz, Magnitude(pressing)), impulses);
   return absl::OkStatus();
 }
 

@@ -25,8 +25,11 @@ struct BodyImpulse {
   double extent_m = 0;    ///< extent of the object
   double mass_kg = 1;     ///< mass of the object
   Vector3 point_m{};      ///< the point on the surface, in the object's frame at its size
-  /// The angular impulse about the centre of mass, times a root of the inverse tensor of inertia.
-  /// Half its square is the energy of the turn that it gives the object at rest, J.
+  /// The part of the impulse that determines the duration, N s, in the object's frame: the one
+  /// along the contact's normal, or all of it if nobody told the normal.
+  Vector3 pressing{};
+  /// The angular impulse of that part about the centre of mass, times a root of the inverse tensor
+  /// of inertia. Half its square is the energy of the turn that it gives the object at rest, J.
   Vector3 turn{};
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.

@@ -29,8 +29,9 @@ const { CarillonError } = require('./errors');
  */
 
 /**
- * A blow that you intend, such as that of a hammer, `timeOffset` seconds after the step's time.
- * @typedef {Strike & { object: ObjectLike, timeOffset?: number, second?: Second }} Impact
+ * A blow that you intend, such as that of a hammer, `timeOffset` seconds after the step's time. With `normal`, which is
+ * perpendicular to the surfaces that touch, of any length and in the frame of the impulse, friction does not shorten it.
+ * @typedef {Strike & { object: ObjectLike, timeOffset?: number, second?: Second, normal?: Vector }} Impact
  */
 
 /**
@@ -57,8 +58,9 @@ const { CarillonError } = require('./errors');
  */
 
 /**
- * Impacts as columns. A duration is in seconds, zero or more; NaN leaves one to the daemon.
- * @typedef {ContactPlaces & { impulses: Table, durations?: Numbers, timeOffsets?: Numbers, striker?: Striker }} Impacts
+ * Impacts as columns. A duration is in seconds, zero or more; NaN leaves one to the daemon. A normal of zeros is none.
+ * @typedef {ContactPlaces & { impulses: Table, durations?: Numbers, timeOffsets?: Numbers, striker?: Striker,
+ *   normals?: Table }} Impacts
  */
 
 /**
@@ -83,6 +85,7 @@ const MEANINGS = {
   forces: `newtons ${STREAM_FRAME}`,
   secondPoints: "metres in the second object's own frame, or in the scene's in a stream with frame: 'scene'",
   secondRotations: `${ROTATION} from the first object's frame into the second's`,
+  normals: 'perpendicular to the surfaces that touch, of any length, in the frame of the impulses',
   positions: "metres in the scene's frame",
   orientations: `${ROTATION} from the object's frame into the scene's`,
 };
@@ -93,8 +96,8 @@ const PARTNER = 'a whole number from 0 to 4294967295 that names the other body, 
   'bodies';
 const DURATION = 'zero seconds or more, or NaN, which leaves it to the daemon';
 const STEP_KEYS = ['contacts', 'impacts', 'forces', 'poses', 'listener', 'timeScale'];
-const COLLISION = ['duration', 'timeOffset', 'striker'];
-const COLLISIONS = ['durations', 'timeOffsets', 'striker'];
+const COLLISION = ['duration', 'timeOffset', 'striker', 'normal'];
+const COLLISIONS = ['durations', 'timeOffsets', 'striker', 'normals'];
 /** The Frame in which points and impulses are those of the scene. */
 const SCENE = 'FRAME_SCENE';
 const SECOND_COLUMNS = ['secondObjects', 'secondPoints', 'secondRotations'];
@@ -228,6 +231,7 @@ function contactColumns(columns, name, frame) {
   refuseNoNumbers({ roughnessDepth, irregularityLength }, name);
   return { kind, object: handles(columns.objects, count), pointM, [field]: values, ...numberColumns(columns, count),
     ...present({ roughnessDepth, irregularityLengthM: irregularityLength }),
+    ...given('normal', columns.normals && table(columns.normals, 'normals')),
     ...secondColumns(columns, pointM, frame), ...given('hertz', toStriker(columns.striker)) };
 }
 
@@ -278,6 +282,7 @@ function contactRow(row, name, where, frame) {
   pointM: vector(row.point, `point of ${where}`, MEANINGS.points),
   [field]: vector(row[key], `${key} of ${where}`, MEANINGS[vectors]),
   ...given('durationS', durationOf(row.duration, `duration of ${where}`)),
+  ...given('normal', row.normal && vector(row.normal, `normal of ${where}`, MEANINGS.normals)),
   ...given('roughness', toRoughness(row.roughness, where)), ...given('hertz', toStriker(row.striker)),
   ...given('second', secondObject(row, where, frame)) };
 }

@@ -73,6 +73,7 @@ absl::Status ReadFields(const v1::Contact& row, Target& target) {
   ASSIGN_OR_RETURN(contact.impulse.impulse_newton_seconds, VectorOf(row));
   if constexpr (requires { target.time_offset_s; }) {
     RETURN_IF_ERROR(ReadDuration(row, contact.impulse));
+    if (row.has_normal()) contact.impulse.normal = ToArray(row.normal());
     target.time_offset_s = row.time_offset_s();
   }
   if constexpr (requires { target.partner; }) target.partner = row.partner();
@@ -118,6 +119,12 @@ std::optional<double> ToDuration(const v1::ContactColumns& columns, int row) {
   return columns.duration_s(row);
 }
 
+std::optional<Vector3> ToNormal(const v1::ContactColumns& columns, int row) {
+  if (columns.normal().empty()) return std::nullopt;
+  const Vector3 normal = ToArray(columns.normal(), row);
+  return normal == Vector3{} ? std::nullopt : std::optional(normal);
+}
+
 /// Returns a row's number, or zero if the column is empty.
 template <typename Number>
 Number ToNumber(const Numbers<Number>& column, int row) {
@@ -136,6 +143,7 @@ void ReadFields(const v1::ContactColumns& columns, int row, Target& target) {
   contact.second = ToSecond(columns, row);
   if constexpr (requires { target.time_offset_s; }) {
     contact.impulse.duration_s = ToDuration(columns, row);
+    contact.impulse.normal = ToNormal(columns, row);
     target.time_offset_s = ToNumber(columns.time_offset_s(), row);
   }
   if constexpr (requires { target.partner; }) target.partner = ToNumber(columns.partner(), row);
@@ -217,7 +225,8 @@ absl::Status Validate(const v1::ContactColumns& columns) {
                      {"travel_speed_m_per_s", columns.travel_speed_m_per_s_size(), count, 1, true},
                      {"second_object", seconds, count, 1, true},
                      {"second_point_m", columns.second_point_m_size(), seconds, 3},
-                     {"second_rotation", columns.second_rotation_size(), seconds, 4, true}});
+                     {"second_rotation", columns.second_rotation_size(), seconds, 4, true},
+                     {"normal", columns.normal_size(), count, 3, true}});
 }
 
 absl::Status Validate(const v1::PoseColumns& columns) {

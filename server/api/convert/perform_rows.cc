@@ -34,6 +34,7 @@ class ByContent {
     if (const auto order = Compare(columns_.time_offset_s(), 1, a, b); order != 0) return order < 0;
     if (const auto order = Compare(columns_.duration_s(), 1, a, b); order != 0) return order < 0;
     if (const auto order = Compare(columns_.point_m(), 3, a, b); order != 0) return order < 0;
+    if (const auto order = Compare(columns_.normal(), 3, a, b); order != 0) return order < 0;
     return Compare(vectors, 3, a, b) < 0;
   }
 

@@ -38,14 +38,6 @@ absl::Status Malformed(absl::string_view message) {
   return Refusal(absl::StatusCode::kInvalidArgument, "PERFORMANCE_MALFORMED", message);
 }
 
-/// Returns the same refusal for an environment, with the figure "environment".
-absl::Status InEnvironment(const absl::Status& status, size_t environment) {
-  v1::ErrorInfo error = ToErrorInfo(status);
-  error.set_message(absl::StrCat("environment ", environment, ", ", error.message()));
-  (*error.mutable_metadata())["environment"] = absl::StrCat(environment);
-  return FromErrorInfo(status.code(), error);
-}
-
 /// Takes the settings, then performs one step after the other. A client that thinks for an hour
 /// between two steps keeps its environments.
 class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformResponse> {
@@ -193,7 +185,8 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
       const uint64_t count = environment.rejected_count();
       if (count == told_counts_[i]) continue;
       rejected_count_ += count - std::exchange(told_counts_[i], count);
-      last_rejection_ = InEnvironment(environment.last_rejection(), i);
+      last_rejection_ = About(absl::StrCat("environment ", i), "environment", absl::StrCat(i),
+                              environment.last_rejection());
     }
   }
 

@@ -30,6 +30,7 @@ test('the object with the lower handle is the object of a row, however the engin
   const [row] = rows.rows({ ...contact, first: still('a'), second: still('b') });
   assert.deepEqual([row.object, row.point, row.second], [2, [2, 0, 0], { object: 4, point: [1, 0, 0] }]);
   assert.deepEqual(row.impulse.map((x) => x + 0), [0, 0, -3]);
+  assert.deepEqual(row.normal, [0, 0, 1]);
   assert.deepEqual(rows.rows({ ...contact, first: still('c'), second: still('d') }), []);
   // The client for Node refuses rows with other names.
   const [silent] = rows.rows({ ...contact, first: still('a'), second: { key: 'c', massKg: 2 } });

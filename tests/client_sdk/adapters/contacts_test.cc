@@ -253,6 +253,7 @@ TYPED_TEST(TwoBalls, GiveRowsWithASecondObjectThatAddUpToTheChangeOfMomentumOfBo
     EXPECT_EQ(contact.second().object(), kLeft);
     EXPECT_EQ(contact.partner(), step.contacts(0).partner());
     EXPECT_NEAR(contact.impulse_newton_seconds().x(), 0, TypeParam::kRounding);
+    EXPECT_NEAR(std::abs(contact.normal().y()), 1, TypeParam::kRounding);
     sum -= contact.impulse_newton_seconds().y();
   }
   EXPECT_GT(sum, TypeParam::kLeastNewtonSeconds);

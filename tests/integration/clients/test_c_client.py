@@ -32,7 +32,7 @@ class Object(ctypes.Structure):
 class Contact(ctypes.Structure):
     _fields_ = [("kind", ctypes.c_int32), ("object", ctypes.c_uint32), ("point_m", Vec3), ("impulse", Vec3),
                 ("force", Vec3), ("partner", ctypes.c_uint32), ("duration_s", ctypes.c_double),
-                ("travel_speed_m_per_s", ctypes.c_double), ("roughness_depth", ctypes.c_double)]
+                ("travel_speed_m_per_s", ctypes.c_double), ("roughness_depth", ctypes.c_double), ("normal", Vec3)]
 
 
 IMPACT, FORCE = 1, 2
@@ -246,6 +246,24 @@ class CClientTest(DaemonTest):
         self.assertEqual(self.c.create_model(BAR, meshes.MATERIAL).name, self.model.value.decode())
         self.assertGreater(same.peak, 1e-5)
         numpy.testing.assert_array_equal(self.render(file), same.samples)
+
+    def test_an_oblique_blow_with_a_normal_renders_to_the_samples_that_python_gets(self):
+        point, push = (0.2, 0.015, 0.01), (0.008, 0, -0.01)
+
+        def steps(handle):
+            struck = impact(handle, Vec3(*point), Vec3(*push))
+            struck.normal = Vec3(0, 0, 1)
+            return [Step(0.0, ctypes.pointer(struck), 1)]
+
+        heard = []
+        for normals in ([(0, 0, 1)], None):
+            trace = carillon.Trace(1 / 60)
+            handle = trace.add(self.model.value.decode(), meshes.MATERIAL)
+            trace.step(0, impacts=carillon.Impacts(handle, point, push, normals=normals))
+            heard.append(self.c.render(trace, sample_rate_hz=44100, tail_s=0.5))
+        numpy.testing.assert_allclose(self.render(self.write_trace("oblique.contacts", steps)), heard[0].samples,
+                                      atol=1e-4 * heard[0].peak)
+        self.assertGreater(abs(heard[0].samples - heard[1].samples).max(), 1e-2 * heard[0].peak)
 
     def test_a_trace_in_slow_motion_and_with_a_pause_renders_to_the_samples_that_python_gets(self):
         def steps(handle):

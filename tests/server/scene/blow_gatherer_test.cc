@@ -28,7 +28,10 @@ SurfaceImpulse AlongZ(double newton_seconds, uint32_t vertex = 0) {
 }
 
 BodyImpulses ImpulseOn(uint32_t handle, const SurfaceImpulse& impulse) {
-  return {.by = {BodyImpulse{.handle = handle, .event = {.action = impulse}}}, .count = 1};
+  const auto& [x, y, z] = impulse.impulse_newton_seconds;
+  return {
+      .by = {BodyImpulse{.handle = handle, .event = {.action = impulse}, .pressing = {x, y, z}}},
+      .count = 1};
 }
 
 void TouchBy(BlowGatherer& gatherer, double newton_seconds, uint32_t partner = 9,
@@ -161,6 +164,57 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
 
 /// The impulse that holds an object of 1 kg up in a step.
 constexpr double kWeight = 9.81 * kStepS;
+
+/// The blows of a body of 1 kg that rests for `rests_s` and, after a gap, for 40 steps more, N s.
+/// The first step after the gap has the impulse that the body gets in `weighs_s`.
+std::vector<float> Stutter(double rate_hz, double gap_s, double weighs_s, double rests_s = 0.3) {
+  BlowGatherer gatherer(1 / rate_hz);
+  std::vector<float> blows;
+  double time_s = 0;
+  const int last = static_cast<int>(0.4 * rate_hz);
+  for (int step = 0; step < last + 40; ++step) {
+    time_s += step == last ? gap_s : 1 / rate_hz;
+    for (const ForceEvent& event : gatherer.Begin(time_s)) {
+      if (ImpulseOf(event)) blows.push_back(*ImpulseOf(event));
+    }
+    const double impulse = 9.81 * (step == last ? weighs_s : 1 / rate_hz);
+    if (step >= last - rests_s * rate_hz) TouchBy(gatherer, impulse);
+    for (const ForceEvent& event : gatherer.End()) {
+      if (ImpulseOf(event)) blows.push_back(*ImpulseOf(event));
+    }
+  }
+  return blows;
+}
+
+TEST(BlowGatherer, ABodyAtRestDoesNotStrikeWhenAGameStutters) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0}) {
+    for (const double gap_s : {1.6 / rate_hz, 2 / rate_hz, 0.1, 0.3}) {
+      EXPECT_TRUE(Stutter(rate_hz, gap_s, gap_s).empty()) << rate_hz << " Hz, " << gap_s << " s";
+      // What exceeds the load by far is a blow all the same.
+      const std::vector<float> struck = Stutter(rate_hz, gap_s, 10 * gap_s);
+      ASSERT_EQ(struck.size(), 1U) << rate_hz << " Hz, " << gap_s << " s";
+      EXPECT_NEAR(struck[0], 98.1 * gap_s, 0.2 * 98.1 * gap_s);
+    }
+    // A body that only just touched had no load before the gap.
+    const std::vector<float> landed = Stutter(rate_hz, 0.3, 0.3, 0);
+    EXPECT_GT(std::reduce(landed.begin(), landed.end()), 0.9F * 9.81F * 0.3F) << rate_hz << " Hz";
+  }
+}
+
+TEST(BlowGatherer, ABodyAtRestDoesNotStrikeInStepsOfAnyLength) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> length_s(1.0 / 120, 1.0 / 15);
+  BlowGatherer gatherer(1.0 / 60);
+  double time_s = 0, struck = 0;
+  for (int step = 0; step < 600; ++step) {
+    const double step_s = step < 20 ? 1.0 / 60 : length_s(random);
+    time_s += step_s;
+    for (const ForceEvent& event : gatherer.Begin(time_s)) struck += ImpulseOf(event).value_or(0);
+    TouchBy(gatherer, 9.81 * step_s);
+    for (const ForceEvent& event : gatherer.End()) struck += ImpulseOf(event).value_or(0);
+  }
+  EXPECT_EQ(struck, 0);
+}
 
 TEST(BlowGatherer, WhatRestsWhenTheSimulationBeginsDoesNotStrike) {
   for (const int step_count : {2, 5, 50}) {
@@ -656,6 +710,18 @@ TEST(BlowGatherer, ABlowHasTheSpeedOfThePosesWhateverTheRestitution) {
     EXPECT_NEAR(DurationS(blows[0]), AtSpeed(kFallMPerS, impulse / 2), 1e-9) << restitution;
     EXPECT_NEAR(blows[0].collision.stated_speed_m_per_s, kFallMPerS, 1e-9) << restitution;
   }
+}
+
+TEST(BlowGatherer, ABlowWithFrictionHasTheSpeedAlongTheNormal) {
+  SurfaceImpulse oblique = AlongZ(kFallMPerS);
+  oblique.impulse_newton_seconds[0] = static_cast<float>(0.6 * kFallMPerS);
+  oblique.pulse = Pulse::RaisedCosine(1e-3F);
+  BodyImpulses impulses = Landing(kFallMPerS);
+  impulses.by[0].event.action = oblique;
+  const ForceEvent blow = Fall({impulses}).at(0), straight = Fall({Landing(kFallMPerS)}).at(0);
+  EXPECT_NEAR(blow.collision.stated_speed_m_per_s, kFallMPerS, 1e-9);
+  EXPECT_NEAR(blow.collision.reduced_mass_kg, 1, 1e-9);
+  EXPECT_NEAR(DurationS(blow), DurationS(straight), 1e-9);
 }
 
 TEST(BlowGatherer, ASpeedThatTheImpulseContradictsDoesNotCount) {

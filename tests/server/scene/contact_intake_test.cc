@@ -249,6 +249,28 @@ TEST_F(ReadingTest, AContactWithoutADurationIsElasticAndHasTheStreamsPulse) {
   EXPECT_EQ(Newest().pulse, Newest(1).pulse);
 }
 
+TEST_F(ReadingTest, FrictionDoesNotShortenAContactWhoseNormalIsKnown) {
+  ContactIntake own = Open({}), shared = Open({.scene_frame = true});
+  ObjectImpulse impulse = SmallImpulse(1, 0.02);
+  impulse.contact.impulse.duration_s = std::nullopt;
+  const auto lasting_s = [&](ContactIntake& intake, const Vector3& newton_seconds,
+                             const std::optional<Vector3>& normal) {
+    impulse.contact.impulse.impulse_newton_seconds = newton_seconds;
+    impulse.contact.impulse.normal = normal;
+    return Strike(intake, impulse).pulse.duration_s();
+  };
+  const float straight_s = lasting_s(own, {0.02, 0, 0}, std::nullopt);
+  const float oblique_s = lasting_s(own, {0.02, 0.016, 0}, std::nullopt);
+  EXPECT_LT(oblique_s, 0.99F * straight_s);
+  for (const double length : {-3.0, 0.1}) {  // Neither its sense nor its length has an effect.
+    EXPECT_NEAR(lasting_s(own, {0.02, 0.016, 0}, Vector3{length, 0, 0}), straight_s, 1e-9F);
+  }
+  // A normal across the impulse cannot be right.
+  EXPECT_EQ(lasting_s(own, {0.02, 0.016, 0}, Vector3{0, 0, 1}), oblique_s);
+  shared.Move(1, {.orientation = {.w = std::sqrt(0.5), .z = std::sqrt(0.5)}});  // x becomes y
+  EXPECT_NEAR(lasting_s(shared, {-0.016, 0.02, 0}, Vector3{0, 1, 0}), straight_s, 1e-9F);
+}
+
 TEST_F(ReadingTest, TheModesOfAThinBodyYieldToABlowWithoutADuration) {
   auto thin = std::make_shared<ModalModel>(*SmallModel());
   thin->digest = std::string(64, 'b');

@@ -35,6 +35,7 @@ MEANINGS = {
     "scene's in a stream with frame=\"scene\"",
     "impulses": f"newton seconds {STREAM_FRAME}", "forces": f"newtons {STREAM_FRAME}",
     "second_rotations": f"{ROTATION} from the first object's frame into the second's",
+    "normals": "perpendicular to the surfaces that touch, of any length, in the frame of the impulses",
     "positions": "metres in the scene's frame",
     "orientations": f"{ROTATION} from the object's frame into the scene's",
     "durations": "seconds", "time_offsets": "seconds after the step's time", "travel_speeds": "m/s"}
@@ -69,6 +70,7 @@ class _Impulses:
     second_rotations: Optional[Array] = None
     striker: Striker = None
     environments: Any = None
+    normals: Optional[Array] = None
 
 
 @dataclasses.dataclass
@@ -83,7 +85,8 @@ class Impacts(_Impulses):
     for none. `second_points` (N x 3, metres) are the same places in each second object's own frame; in a stream with
     frame="scene" they are in the scene's frame, and by default the points. `second_rotations` (N x 4, quaternions
     w, x, y, z) rotate from the first object's frame into the second's. `environments` are those of a performance, by
-    their index."""
+    their index. `normals` (N x 3, of any length, zero for none), in the frame of the impulses, are perpendicular to the
+    surfaces that touch; with them friction does not shorten an impact."""
 
 
 @dataclasses.dataclass
@@ -290,6 +293,8 @@ def _fill_collision_columns(columns: contact_pb2.ContactColumns, given: _Impulse
         if (durations < 0).any():
             checks.refuse(durations[durations < 0].tolist()[0], "an entry of durations", DURATION)
         append(columns, duration_s=numpy.where(numpy.isnan(durations), ABSENT, durations))
+    if given.normals is not None:
+        append(columns, normal=_rows(given.normals, "normals", 3, count))
     if given.striker is not None:
         columns.hertz.CopyFrom(to_hertz(given.striker))
 

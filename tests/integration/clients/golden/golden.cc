@@ -54,6 +54,7 @@ constexpr const char* kSlide = R"pb(
     object: [ 1, 2 ]
     point_m: [ 0.125, 0.016, 0, 0.0625, 0, 0.01 ]
     impulse_newton_seconds: [ 0, 0, 0.0625, 0, 0, -0.03125 ]
+    normal: [ 0, 0, 1, 0, 0, 0 ]
     partner: [ 0, 9 ]
     travel_speed_m_per_s: [ 0, 0.5 ]
     roughness_depth: 0.25

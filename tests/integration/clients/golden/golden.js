@@ -19,7 +19,7 @@ function makeTrace(model) {
   for (let i = 1; i <= 16; i += 1) {
     trace.step(i * STEP_S, { contacts: { objects: [1, 2], points: [[0.125, 0.016, 0], [0.0625, 0, 0.01]],
       impulses: Float32Array.of(0, 0, 0.0625, 0, i / 256, -0.03125), partners: [0, 9], travelSpeeds: [0, 0.5],
-      roughnessDepth: 0.25, irregularityLength: 0.001 } });
+      roughnessDepth: 0.25, irregularityLength: 0.001, normals: [[0, 0, 1], [0, 0, 0]] } });
   }
   trace.step(0.25, { timeScale: 0 });
   trace.step(0.5, { timeScale: 0.5, impacts: { objects: 1, points: [0.25, 0, 0.01], impulses: [0, 0.5, 0],

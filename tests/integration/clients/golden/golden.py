@@ -22,7 +22,7 @@ def make_trace(model):
     for i in range(1, 17):
         trace.step(i * STEP_S, contacts=carillon.Contacts(
             [1, 2], [(0.125, 0.016, 0), (0.0625, 0, 0.01)], [(0, 0, 0.0625), (0, i / 256, -0.03125)], partners=[0, 9],
-            travel_speeds=[0, 0.5], roughness_depth=0.25, irregularity_length=0.001))
+            travel_speeds=[0, 0.5], roughness_depth=0.25, irregularity_length=0.001, normals=[(0, 0, 1), (0, 0, 0)]))
     trace.step(0.25, time_scale=0)
     trace.step(0.5, time_scale=0.5, impacts=carillon.Impacts(
         1, [(0.25, 0, 0.01)], [(0, 0.5, 0)], durations=0.0009765625, time_offsets=0.0078125, second_objects=2,

@@ -200,6 +200,7 @@ TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
   for (const uint32_t partner : {4U, 5U, 6U}) {
     columns.add_partner(partner);
     columns.add_travel_speed_m_per_s(static_cast<float>(partner) / 2);
+    Append(columns.mutable_normal(), {0, 0, partner == 6 ? 2.0F : 0.0F});
   }
   ASSERT_TRUE(Validate(columns).ok());
   ObjectTouch touch;
@@ -207,9 +208,12 @@ TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
   EXPECT_EQ(touch.contact.second->handle, 8U);
   EXPECT_FLOAT_EQ(static_cast<float>(touch.time_offset_s), 0.002F);
   EXPECT_EQ(touch.partner, 6U);
+  EXPECT_EQ(touch.contact.impulse.normal, (Vector3{0, 0, 2}));
   EXPECT_EQ(touch.roughness.travel_speed_m_per_s, 3);
   EXPECT_EQ(touch.roughness.depth, 0.4);
   EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
+  ReadRow(columns, 1, touch);
+  EXPECT_FALSE(touch.contact.impulse.normal.has_value());
   columns.mutable_partner()->RemoveLast();
   EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: the column partner"));
 }
