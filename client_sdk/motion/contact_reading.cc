@@ -15,6 +15,9 @@ constexpr double kShareOfLoad = 0.2;
 constexpr double kLeastSpeed = 0.02;
 /// Blows that lie closer than this part of a frame strike together.
 constexpr double kTogether = 0.02;
+/// The speed of approach is at least half of the change that the impulse makes, in an elastic
+/// collision. One below this share of the change is not that of the blow, but of one beside it.
+constexpr double kLeastOfSpeed = 0.3;
 /// Impulses that can be divided more evenly by less than this part stay as they are.
 constexpr double kLeastEven = 0.05;
 
@@ -400,9 +403,18 @@ void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_
       if (of_body.balanced()) of += motion.gravity_m_per_s2 * (time_s - before_s);
       return of;
     };
-    blow.approach_m_per_s =
-        std::max(0.0, blow.normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
-                                      velocity(blow.a, blow.orientation_a, blow.point_a_m)));
+    blow.approach_m_per_s = blow.normal.dot(velocity(blow.b, blow.orientation_b, blow.point_b_m) -
+                                            velocity(blow.a, blow.orientation_a, blow.point_a_m));
+    const auto per_kg = [&](uint32_t body, const Turn& turn, const Vector& point_m) {
+      const BodyMotion& of_body = bodies.motions[body];
+      if (!of_body.balanced()) return 0.0;
+      const Vector lever = (turn * (point_m - of_body.centre_m())).cross(blow.normal);
+      return 1 / of_body.mass_kg() + lever.dot(of_body.InverseInertia(blow.frame) * lever);
+    };
+    const double changed_m_per_s = std::abs(blow.normal.dot(blow.impulse_newton_seconds)) *
+                                   (per_kg(blow.a, blow.orientation_a, blow.point_a_m) +
+                                    per_kg(blow.b, blow.orientation_b, blow.point_b_m));
+    if (blow.approach_m_per_s < kLeastOfSpeed * changed_m_per_s) blow.approach_m_per_s = 0;
   }
 }
 

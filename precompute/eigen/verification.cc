@@ -29,18 +29,6 @@ VectorBlock Gather(const NodeMatrix& A, const std::vector<int32_t>& position,
   return y;
 }
 
-std::vector<int32_t> NaturalOrder(const SystemMatrices& system) {
-  std::vector<int32_t> order(static_cast<size_t>(system.unknown_count() / 3));
-  for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int32_t>(i);
-  return order;
-}
-
-Measurement MeasureAsAssembled(const SystemMatrices& system, const Modes& modes) {
-  const std::vector<int32_t> order = NaturalOrder(system);
-  Workers alone(1);
-  return Measure(MakeNodeMatrix(system.K, system.M, order), order, modes, alone);
-}
-
 }  // namespace
 
 Measurement Measure(const NodeMatrix& A, const std::vector<int32_t>& order, const Modes& modes,
@@ -105,16 +93,6 @@ double StiffestNode(const NodeMatrix& A) {
 double OrthogonalityError(const MatrixXd& gram) {
   if (gram.size() == 0) return 0;
   return (gram - MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff();
-}
-
-Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes) {
-  return MeasureAsAssembled(system, modes).residuals;
-}
-
-double OrthogonalityError(const SystemMatrices& system, const MatrixXd& shapes) {
-  const Eigen::VectorXd none = Eigen::VectorXd::Ones(shapes.cols());
-  return OrthogonalityError(
-      MeasureAsAssembled(system, {.eigenvalues = none, .shapes = shapes}).gram);
 }
 
 }  // namespace carillon::precompute

@@ -59,9 +59,4 @@ using BlockRow = Eigen::Array<double, 1, kBlockWidth>;
 BlockRow RelativeResiduals(const NodeMatrix& A, const VectorBlock& elastic,
                            const VectorBlock& inertial, const BlockRow& eigenvalues);
 
-/// These two functions compute the residuals and the orthogonality error from the assembled
-/// matrices.
-Eigen::VectorXd Residuals(const SystemMatrices& system, const Modes& modes);
-double OrthogonalityError(const SystemMatrices& system, const Eigen::MatrixXd& shapes);
-
 }  // namespace carillon::precompute

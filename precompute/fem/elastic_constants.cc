@@ -8,10 +8,4 @@ LameConstants ToLame(const ElasticConstants& elastic) {
   return {.lambda_pa = young * nu / ((1 + nu) * (1 - 2 * nu)), .mu_pa = young / (2 * (1 + nu))};
 }
 
-ElasticConstants FromLame(const LameConstants& lame) {
-  const auto [lambda, mu] = lame;
-  return {.young_pa = mu * (3 * lambda + 2 * mu) / (lambda + mu),
-          .poisson_ratio = lambda / (2 * (lambda + mu))};
-}
-
 }  // namespace carillon::precompute

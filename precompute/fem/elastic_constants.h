@@ -18,8 +18,4 @@ struct ElasticConstants {
 /// Returns lambda = E nu / ((1 + nu)(1 - 2 nu)) and mu = E / (2 (1 + nu)).
 LameConstants ToLame(const ElasticConstants& elastic);
 
-/// Returns E = mu (3 lambda + 2 mu) / (lambda + mu) and nu = lambda / (2 (lambda + mu)), the
-/// inverse of ToLame.
-ElasticConstants FromLame(const LameConstants& lame);
-
 }  // namespace carillon::precompute

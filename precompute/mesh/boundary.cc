@@ -6,8 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
 #include "proto/cpp/error_reason.h"
 
@@ -40,10 +42,6 @@ BoundaryFace FaceOf(const TetMesh& mesh, size_t element_index, const std::array<
     }
   }
   return face;
-}
-
-Corners CornersOf(const BoundaryFace& face) {
-  return {face.nodes[0], face.nodes[1], face.nodes[2]};
 }
 
 /// Returns the sorted corners of all faces, four for each element.
@@ -107,22 +105,27 @@ absl::Status FindBoundary(TetMesh& mesh) {
   return absl::OkStatus();
 }
 
-SurfaceMesh BoundarySurface(const TetMesh& mesh) {
-  SurfaceMesh surface;
-  std::vector<int32_t> vertex_of_node(mesh.nodes.size(), -1);
-  for (const BoundaryFace& face : mesh.boundary) {
-    Corners triangle = CornersOf(face);
-    for (int32_t& corner : triangle) {
-      int32_t& vertex = vertex_of_node[static_cast<size_t>(corner)];
-      if (vertex < 0) {
-        vertex = static_cast<int32_t>(surface.vertices.size());
-        surface.vertices.push_back(mesh.nodes[static_cast<size_t>(corner)]);
-      }
-      corner = vertex;
+SurfaceMesh PartOf(const std::vector<Point>& vertices, std::vector<Corners> triangles) {
+  SurfaceMesh part{{}, std::move(triangles)};
+  absl::flat_hash_map<int32_t, int32_t> number;
+  for (Corners& triangle : part.triangles) {
+    for (int32_t& v : triangle) {
+      const auto [found, is_new] =
+          number.try_emplace(v, static_cast<int32_t>(part.vertices.size()));
+      if (is_new) part.vertices.push_back(vertices[static_cast<size_t>(v)]);
+      v = found->second;
     }
-    surface.triangles.push_back(triangle);
   }
-  return surface;
+  return part;
+}
+
+SurfaceMesh BoundarySurface(const TetMesh& mesh) {
+  std::vector<Corners> triangles;
+  triangles.reserve(mesh.boundary.size());
+  for (const BoundaryFace& face : mesh.boundary) {
+    triangles.push_back({face.nodes[0], face.nodes[1], face.nodes[2]});
+  }
+  return PartOf(mesh.nodes, std::move(triangles));
 }
 
 }  // namespace carillon::precompute

@@ -55,6 +55,11 @@ struct NamedMesh {
   MeshNames names = {};
   /// What the reader left out or changed, for the user.
   std::vector<std::string> warnings = {};
+
+  std::vector<Point>& points() {
+    auto* surface = std::get_if<SurfaceMesh>(&mesh);
+    return surface != nullptr ? surface->vertices : std::get<TetMesh>(mesh).nodes;
+  }
 };
 
 }  // namespace carillon::precompute

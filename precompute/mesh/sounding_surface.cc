@@ -9,12 +9,8 @@ namespace {
 
 constexpr std::array<std::array<size_t, 3>, 1> kWhole = {{{0, 1, 2}}};
 
-// Corners 0-2, mid-sides 3-5 between corners 0-1, 1-2 and 2-0.
-constexpr std::array<std::array<size_t, 3>, 4> kInFour = {
-    {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}}};
-
 std::span<const std::array<size_t, 3>> Pieces(const TetMesh& mesh) {
-  if (mesh.nodes_per_element == 10) return kInFour;
+  if (mesh.nodes_per_element == 10) return kFaceInFour;
   return kWhole;
 }
 

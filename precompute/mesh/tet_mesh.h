@@ -26,6 +26,11 @@ inline constexpr std::array<std::array<int, 2>, 6> kTetEdges = {
 inline constexpr std::array<std::array<int, 3>, 4> kTetFaces = {
     {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
 
+/// Four triangles that make up a face with mid-side nodes, by the places of their corners among the
+/// nodes of the face, which are in the order of BoundaryFace.
+inline constexpr std::array<std::array<size_t, 3>, 4> kFaceInFour = {
+    {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}}};
+
 /// A mesh of tetrahedra of 4 or 10 nodes.
 struct TetMesh {
   std::vector<Point> nodes;  ///< metres

@@ -13,6 +13,7 @@
 #include "precompute/fem/assembly.h"
 #include "precompute/fem/curved_element.h"
 #include "precompute/fem/element.h"
+#include "precompute/fem/tet_rule.h"
 #include "precompute/mesh/curved_edges.h"
 #include "precompute/modes/added_functions.h"
 #include "precompute/modes/curved_integrals.h"
@@ -47,7 +48,7 @@ class ReferenceIntegrals {
  public:
   explicit ReferenceIntegrals(int node_count) {
     std::vector<Eigen::Matrix4d> derivatives;  // products of those of both functions
-    ForEachPoint([&](const Barycentric& at, double weight) {
+    for (const auto& [at, weight] : TetRuleOfDegree5()) {
       const std::vector<FunctionAt> base = BaseFunctions(at, node_count);
       const std::vector<FunctionAt> added = AddedFunctions(at, node_count);
       derivatives.resize(added.size() * base.size(), Eigen::Matrix4d::Zero());
@@ -61,7 +62,7 @@ class ReferenceIntegrals {
           mass(Eigen::Index(i), Eigen::Index(j)) += weight * added[i].value * base[j].value;
         }
       }
-    });
+    }
     for (const Eigen::Matrix4d& products : derivatives) mixed.emplace_back(products);
   }
 
@@ -85,26 +86,6 @@ class ReferenceIntegrals {
   std::vector<Eigen::Matrix4d> own;  ///< [added]: each added function with itself
   Eigen::MatrixXd mass;              ///< #added by #base
 
- private:
-  /// Uses the product of Gauss-Legendre rules of four points, collapsed onto the tetrahedron. It is
-  /// exact for polynomials of degree five.
-  template <typename Use>
-  static void ForEachPoint(const Use& use) {
-    constexpr std::array<double, 4> kAt = {0.0694318442029737, 0.3300094782075719,
-                                           0.6699905217924281, 0.9305681557970263};
-    constexpr std::array<double, 4> kWeight = {0.1739274225687269, 0.3260725774312731,
-                                               0.3260725774312731, 0.1739274225687269};
-    for (size_t i = 0; i < 4; ++i) {
-      for (size_t j = 0; j < 4; ++j) {
-        for (size_t k = 0; k < 4; ++k) {
-          const double x = kAt[i], y = (1 - x) * kAt[j], z = (1 - x - y) * kAt[k];
-          // The integral is divided by the volume, which is 1/6.
-          const double jacobian = 6 * (1 - x) * (1 - x - y);
-          use(Barycentric(1 - x - y - z, x, y, z), jacobian * kWeight[i] * kWeight[j] * kWeight[k]);
-        }
-      }
-    }
-  }
 };
 
 /// Returns a(f, g) of two functions, a 3 by 3 block for their components, where `integrals` has the

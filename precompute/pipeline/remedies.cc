@@ -34,11 +34,12 @@ std::string InTwoDigits(double value) {
   return std::isfinite(value) && value > 0 ? absl::StrFormat("%.2g", value) : "";
 }
 
-/// Returns a whole number of two digits that are not zero, such as 3200.
-std::string RoundedWhole(double value) {
+/// Returns a whole number of two digits that are not zero, such as 3200, or an empty string for a
+/// value below one. `round` is std::round, std::floor or std::ceil.
+std::string RoundedWhole(double value, double (*round)(double) = std::round) {
   if (!(value >= 1)) return "";
   const double unit = std::pow(10, std::max(0.0, std::floor(std::log10(value)) - 1));
-  return absl::StrFormat("%.0f", unit * std::round(value / unit));
+  return absl::StrFormat("%.0f", unit * round(value / unit));
 }
 
 /// A mode lies surely in a band, whatever mesh it is computed on, if it is by this factor inside.
@@ -48,19 +49,6 @@ constexpr double kInside = 1.002;
 constexpr double kUsualLowestHz = 20;
 
 double TopOfBandHz(const worker::v1::WorkerRequest& request) { return UseOf(request).high_hz; }
-
-/// Returns a band's upper end with two digits, at most as high as given.
-std::string RoundedDown(double value) {
-  if (!(value >= 1)) return "";
-  const double unit = std::pow(10, std::max(0.0, std::floor(std::log10(value)) - 1));
-  return absl::StrFormat("%.0f", unit * std::floor(value / unit));
-}
-
-/// Returns a band's upper end with two digits, at least as high as given.
-std::string RoundedUp(double value) {
-  const double unit = std::pow(10, std::max(0.0, std::floor(std::log10(value)) - 1));
-  return value > 0 ? absl::StrFormat("%.0f", unit * std::ceil(value / unit)) : "";
-}
 
 double SizeOf(const worker::v1::WorkerRequest& request) {
   return request.size() > 0 ? request.size() : 1;
@@ -91,7 +79,7 @@ std::string SizeInBand(const Refused& refused) {
 /// Returns an upper end of the band below which few enough modes were counted.
 std::string LowerBand(const Refused& refused) {
   const double eigenvalue = refused.Figure("lower_eigenvalue");
-  const std::string band = RoundedDown(UseOf(refused.request).FrequencyHz(eigenvalue));
+  const std::string band = RoundedWhole(UseOf(refused.request).FrequencyHz(eigenvalue), std::floor);
   double high_hz = 0;
   const bool is_band = absl::SimpleAtod(band, &high_hz) &&
                        high_hz > std::max(refused.request.min_frequency_hz(), kUsualLowestHz);
@@ -178,7 +166,7 @@ constexpr Known kSize{"size", "--size",
                       [](const Refused& r) { return SizeInBand(r).empty(); }};
 constexpr Known kHigherBand{
     "max_frequency_hz", "--band", "reaches the first mode; a higher end finds more modes",
-    [](const Refused& refused) { return RoundedUp(1.05 * refused.Figure("first_mode_hz")); },
+    [](const Refused& refused) { return RoundedWhole(1.05 * refused.Figure("first_mode_hz"), std::ceil); },
     [](const Refused& r) {
       const double first_hz = r.Figure("first_mode_hz");
       return first_hz < std::max(r.request.min_frequency_hz(), kUsualLowestHz);

@@ -18,7 +18,7 @@ struct Air {
 /// The radiation of one mode, for unit density and unit modal displacement. With P the far pattern
 /// for dp/dn = n . phi, the outgoing field beyond the body is the sum over l and m of
 /// c_lm h_l(k r) Y_lm(direction), c_lm = k i^(l + 1) P_lm, with r from Transfer::center and Y_lm of
-/// RealHarmonics.
+/// SphereGrid.
 struct ModeRadiation {
   bool in_band = false;  ///< whether the mode was requested
   bool computed = false;

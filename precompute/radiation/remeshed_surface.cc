@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "precompute/mesh/boundary.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/surface/remesh_surface.h"
 #include "proto/cpp/error_reason.h"
@@ -54,7 +55,8 @@ SurfacePlace Weigh(const SurfaceMesh& given, const NearestTriangle::Place& place
   return result;
 }
 
-/// Returns the surface without the triangles that have no area to integrate over.
+/// Returns the surface without the triangles that have no area to integrate over, and without the
+/// vertices that then belong to no triangle.
 SurfaceMesh WithoutFlat(SurfaceMesh mesh, double edge_m) {
   constexpr double kFlat = 1e-9;
   std::erase_if(mesh.triangles, [&](const std::array<int32_t, 3>& triangle) {
@@ -63,25 +65,7 @@ SurfaceMesh WithoutFlat(SurfaceMesh mesh, double edge_m) {
                 &c = mesh.vertices[static_cast<size_t>(triangle[2])];
     return Norm(AreaNormal({a, b, c})) < kFlat * edge_m * edge_m;
   });
-  return mesh;
-}
-
-/// Returns the surface without the vertices that belong to no triangle.
-SurfaceMesh WithoutLoose(const SurfaceMesh& mesh) {
-  SurfaceMesh result;
-  std::vector<int32_t> number(mesh.vertices.size(), -1);
-  for (std::array<int32_t, 3> triangle : mesh.triangles) {
-    for (int32_t& v : triangle) {
-      int32_t& own = number[static_cast<size_t>(v)];
-      if (own < 0) {
-        own = static_cast<int32_t>(result.vertices.size());
-        result.vertices.push_back(mesh.vertices[static_cast<size_t>(v)]);
-      }
-      v = own;
-    }
-    result.triangles.push_back(triangle);
-  }
-  return result;
+  return PartOf(mesh.vertices, std::move(mesh.triangles));
 }
 
 /// Returns how far the given surface lies outside the middle of the edge between two corners of a
@@ -156,7 +140,7 @@ absl::StatusOr<RemeshedSurface> MakeRemeshedSurface(const RadiatingSurface& give
                                                     const NearestTriangle& index, double edge_m,
                                                     Workers& workers) {
   ASSIGN_OR_RETURN(const SurfaceMesh remeshed, Remesh(given.mesh, edge_m));
-  AcousticSurface near_it = MakeAcousticSurface(WithoutLoose(WithoutFlat(remeshed, edge_m)));
+  AcousticSurface near_it = MakeAcousticSurface(WithoutFlat(remeshed, edge_m));
   std::vector<SurfacePlace> places = PlacesOn(given.mesh, index, near_it);
   SurfaceMesh on_it = std::move(near_it.mesh);
   for (size_t v = 0; v < places.size(); ++v) {

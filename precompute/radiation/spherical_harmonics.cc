@@ -65,21 +65,6 @@ std::pair<double, double> GaussNode(int n, int i) {
 
 }  // namespace
 
-std::vector<double> RealHarmonics(int order, const Point& direction) {
-  const double r = std::hypot(direction[0], direction[1], direction[2]);
-  const double phi = std::atan2(direction[1], direction[0]);
-  const std::vector<double> p = Legendre(order, direction[2] / r);
-  std::vector<double> harmonics(HarmonicCount(order));
-  for (int l = 0; l <= order; ++l) {
-    for (int m = -l; m <= l; ++m) {
-      const double turned = m < 0 ? std::sin(-m * phi) : std::cos(m * phi);
-      harmonics[HarmonicIndex(l, m)] =
-          DegreeFactor(m) * turned * p[static_cast<size_t>(l * (l + 1) / 2 + std::abs(m))];
-    }
-  }
-  return harmonics;
-}
-
 SphereGrid::SphereGrid(int order) : order_(order) {
   const int rings = order + 1, around = 2 * order + 2;
   for (int i = 0; i < rings; ++i) {

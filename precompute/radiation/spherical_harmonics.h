@@ -16,17 +16,15 @@ inline size_t HarmonicCount(int order) {
   return static_cast<size_t>(order + 1) * static_cast<size_t>(order + 1);
 }
 
-/// Returns the real, orthonormal harmonics up to `order` in a direction (of any length but zero):
+/// Directions and weights that integrate products of two harmonics up to `order` exactly. The
+/// directions are Gauss's nodes in cos theta and equal steps in phi. The harmonics are real and
+/// orthonormal:
 ///
 ///     Y_lm = n_l|m| P_l^|m|(cos theta) * { sqrt(2) cos(m phi), m > 0;  1, m = 0;
 ///                                          sqrt(2) sin(|m| phi), m < 0 }
 ///
 /// without the phase of Condon and Shortley. theta is measured from the z axis, and phi from x to
 /// y.
-std::vector<double> RealHarmonics(int order, const Point& direction);
-
-/// Directions and weights that integrate products of two harmonics up to `order` exactly. The
-/// directions are Gauss's nodes in cos theta and equal steps in phi.
 class SphereGrid {
  public:
   explicit SphereGrid(int order);

@@ -9,8 +9,6 @@ namespace carillon::precompute {
 /// Number of targets (the vertices at which a kernel sums the fields of all sources) that a kernel
 /// processes at once. Arrays over targets are padded to multiples of this number.
 inline constexpr int64_t kSweepGrain = 32;
-/// Largest number of right-hand sides that one evaluation of the kernel serves.
-inline constexpr int kMaxSweepSides = 2;
 /// Number of sums for each target and side: the real and imaginary parts of the scalar and of the
 /// three components of the curls' field.
 inline constexpr int kSweepSums = 8;

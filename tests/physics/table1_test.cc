@@ -38,8 +38,8 @@ constexpr Row kRows[] = {
 };
 
 IntendedUse UseOf(const Row& row, double size = 1) {
-  const ElasticConstants elastic = FromLame({.lambda_pa = row.lambda_pa, .mu_pa = row.mu_pa});
-  return {.young_pa = elastic.young_pa,
+  const double lambda_pa = row.lambda_pa, mu_pa = row.mu_pa;
+  return {.young_pa = mu_pa * (3 * lambda_pa + 2 * mu_pa) / (lambda_pa + mu_pa),
           .density_kg_per_m3 = row.density_kg_per_m3,
           .alpha1_s = row.alpha1_s,
           .alpha2_per_s = row.alpha2_per_s,

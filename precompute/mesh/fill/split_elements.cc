@@ -73,9 +73,8 @@ class Splitter {
 
   void SplitFace(const BoundaryFace& face) {
     const auto& n = face.nodes;
-    for (const auto& [a, b, c] : std::array<std::array<int32_t, 3>, 4>{
-             {{n[0], n[3], n[5]}, {n[3], n[1], n[4]}, {n[5], n[4], n[2]}, {n[3], n[4], n[5]}}}) {
-      split_.boundary.push_back({{a, b, c, -1, -1, -1}, face.given_triangle});
+    for (const auto& [a, b, c] : kFaceInFour) {
+      split_.boundary.push_back({{n[a], n[b], n[c], -1, -1, -1}, face.given_triangle});
     }
   }
 

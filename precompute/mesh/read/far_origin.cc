@@ -28,9 +28,7 @@ Point FarOrigin(const std::vector<Point>& points) {
 
 void CountFrom(const Point& origin, NamedMesh& named) {
   if (origin == Point{0, 0, 0}) return;
-  auto* surface = std::get_if<SurfaceMesh>(&named.mesh);
-  auto& points = surface != nullptr ? surface->vertices : std::get<TetMesh>(named.mesh).nodes;
-  for (Point& p : points) p = Difference(p, origin);
+  for (Point& p : named.points()) p = Difference(p, origin);
   for (auto& [number, p] : named.names.vertices) p = Difference(p, origin);
   named.names.origin_m = origin;
 }

@@ -32,20 +32,15 @@ void Scale(Point& p, double factor) {
 }
 
 void Scale(NamedMesh& named, double factor) {
-  auto* surface = std::get_if<SurfaceMesh>(&named.mesh);
-  auto& points = surface != nullptr ? surface->vertices : std::get<TetMesh>(named.mesh).nodes;
-  for (Point& p : points) Scale(p, factor);
+  for (Point& p : named.points()) Scale(p, factor);
   for (auto& [number, p] : named.names.vertices) Scale(p, factor);
   Scale(named.names.origin_m, factor);
 }
 
 /// Moves a body that lies too far from the origin for the stored model, and says so.
 void MoveNear(NamedMesh& named) {
-  const auto* tetrahedra = std::get_if<TetMesh>(&named.mesh);
-  const auto& points =
-      tetrahedra != nullptr ? tetrahedra->nodes : std::get<SurfaceMesh>(named.mesh).vertices;
-  if (named.names.origin_m == Point{0, 0, 0} && !points.empty()) {
-    CountFrom(FarOrigin(points), named);
+  if (named.names.origin_m == Point{0, 0, 0} && !named.points().empty()) {
+    CountFrom(FarOrigin(named.points()), named);
   }
   const Point& origin = named.names.origin_m;
   if (origin == Point{0, 0, 0}) return;

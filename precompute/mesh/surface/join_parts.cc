@@ -18,6 +18,7 @@
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
+#include "precompute/mesh/boundary.h"
 #include "precompute/mesh/byte_stream.h"
 #include "precompute/mesh/point_math.h"
 #include "precompute/mesh/run_in_child.h"
@@ -130,22 +131,6 @@ void CloseSharedRims(const SurfaceMesh& surface, std::vector<std::vector<Corners
   }
 }
 
-/// Returns the surface of triangles of `surface`, with no other vertices.
-SurfaceMesh PartOf(const SurfaceMesh& surface, const std::vector<Corners>& triangles) {
-  SurfaceMesh part;
-  absl::flat_hash_map<int32_t, int32_t> number;
-  for (Corners corner : triangles) {
-    for (int32_t& v : corner) {
-      const auto [found, is_new] =
-          number.try_emplace(v, static_cast<int32_t>(part.vertices.size()));
-      if (is_new) part.vertices.push_back(surface.vertices[static_cast<size_t>(v)]);
-      v = found->second;
-    }
-    part.triangles.push_back(corner);
-  }
-  return part;
-}
-
 /// Divides a region into pieces, each with its cavities.
 std::vector<SurfaceMesh> PiecesOf(const SurfaceMesh& region) {
   std::vector<Shell> shells = FindShells(region);
@@ -174,7 +159,7 @@ std::vector<SurfaceMesh> PiecesOf(const SurfaceMesh& region) {
   if (pieces.empty()) return {region};  // CheckSurface refuses it by name
   std::vector<SurfaceMesh> surfaces;
   surfaces.reserve(pieces.size());
-  for (const auto& [outer, triangles] : pieces) surfaces.push_back(PartOf(region, triangles));
+  for (const auto& [outer, triangles] : pieces) surfaces.push_back(PartOf(region.vertices, triangles));
   return surfaces;
 }
 
@@ -261,7 +246,7 @@ absl::StatusOr<JoinedParts> JoinParts(const SurfaceMesh& surface,
   CloseSharedRims(surface, regions);
   std::vector<BodyPart> parts;
   for (size_t r = 0; r < regions.size(); ++r) {
-    const SurfaceMesh region = PartOf(surface, regions[r]);
+    const SurfaceMesh region = PartOf(surface.vertices, regions[r]);
     for (SurfaceMesh& piece : PiecesOf(region)) {
       const absl::Status sound = CheckSurface(piece).status();
       if (!sound.ok()) return Explained(sound, absl::StrCat("the region ", names[r]));

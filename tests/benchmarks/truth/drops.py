@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five bodies dropped on a hard floor, by the laws of version 0.1 and by those of today."""
+"""Five bodies dropped on a hard floor."""
 
 import dataclasses
 import math
@@ -19,7 +19,6 @@ FIRST_S = 0.1  # the first contact begins before its middle, so not at the start
 # body's.
 FLOOR = {"striker_young_pa": 30e9, "striker_poisson_ratio": 0.2}
 PASCALS_SQUARED_TO_WATTS = 4 * math.pi / (1.204 * 343)  # of the mean over all directions, 1 m away
-SOFT_S = 5e-4  # the duration of every contact up to version 0.1, where nobody gave one
 
 
 @dataclasses.dataclass
@@ -28,7 +27,6 @@ class Body:
     surface: callable  # (vertices, triangles)
     material: str
     volume_m3: float
-    rayleigh_eta: float  # the loss factor at 1 kHz of the Rayleigh damping that the material had
     wall_m: float = None  # hollow
 
 
@@ -57,10 +55,6 @@ class Drop:
     def meter_db(self):
         """What a sound level meter shows at most: dB(A), fast."""
         return likeness.fast_level_db(self.pascals(), rings.RATE_HZ)
-
-    def silent(self):
-        """Below the smallest step of the file's 24 bits."""
-        return not self.sound.any()
 
     def octaves_db(self):
         return likeness.octave_levels_db(self.sound, rings.RATE_HZ)
@@ -99,22 +93,15 @@ def hollow(wall_m, *size_m):
     return math.prod(size_m) - math.prod(side - 2 * wall_m for side in size_m)
 
 
-BODIES = (Body("steel box", lambda: box(0.10, 0.07, 0.05), "structural_steel", hollow(0.0015, 0.10, 0.07, 0.05), 2e-4,
+BODIES = (Body("steel box", lambda: box(0.10, 0.07, 0.05), "structural_steel", hollow(0.0015, 0.10, 0.07, 0.05),
                wall_m=0.0015),
-          Body("wooden block", lambda: box(0.12, 0.06, 0.04), "oak", 0.12 * 0.06 * 0.04, 0.01),
-          Body("ceramic bowl", bowl, "porcelain", 2 * math.pi * 0.078**2 * 0.004, 1e-3),
-          Body("glass", tumbler, "soda_lime_glass", math.pi * (0.035**2 * 0.1 - 0.033**2 * 0.095), 1e-3),
-          Body("plastic box", lambda: box(0.10, 0.07, 0.03), "abs", hollow(0.0025, 0.10, 0.07, 0.03), 0.025,
-               wall_m=0.0025))
+          Body("wooden block", lambda: box(0.12, 0.06, 0.04), "oak", 0.12 * 0.06 * 0.04),
+          Body("ceramic bowl", bowl, "porcelain", 2 * math.pi * 0.078**2 * 0.004),
+          Body("glass", tumbler, "soda_lime_glass", math.pi * (0.035**2 * 0.1 - 0.033**2 * 0.095)),
+          Body("plastic box", lambda: box(0.10, 0.07, 0.03), "abs", hollow(0.0025, 0.10, 0.07, 0.03), wall_m=0.0025))
 
 
-def rayleigh(eta):
-    """Half of the loss factor at 1 kHz from each term."""
-    omega = 2 * math.pi * 1000
-    return {"alpha1_s": eta / (2 * omega), "alpha2_per_s": eta * omega / 2}
-
-
-def blows(surface, mass_kg, duration_s=None):
+def blows(surface, mass_kg):
     """The bounces: each meets the floor with another vertex, the same in each run, and a third of the mass."""
     vertices = [tuple(map(float, vertex)) for vertex in surface[0]]
     centre = [(min(side) + max(side)) / 2 for side in zip(*vertices)]
@@ -123,8 +110,8 @@ def blows(surface, mass_kg, duration_s=None):
         impulse = mass_kg / 3 * speed * (1 + RESTITUTION)
         inwards = [c - x for x, c in zip(point, centre)]
         collision = {**FLOOR, "reduced_mass_kg": mass_kg / 3, "approach_speed_m_per_s": speed}
-        found.append(programs.Blow(point, tuple(impulse * x / math.hypot(*inwards) for x in inwards), duration_s,
-                                   time_s, {} if duration_s else collision))
+        found.append(programs.Blow(point, tuple(impulse * x / math.hypot(*inwards) for x in inwards),
+                                   time_s=time_s, collision=collision))
         speed *= RESTITUTION
         time_s += 2 * speed / GRAVITY_M_PER_S2
     return found
@@ -149,16 +136,13 @@ def click_db(modes, whole):
     return 10 * math.log10((click**2).sum() / max((numpy.asarray(modes, dtype=float)**2).sum(), 1e-30))
 
 
-def hear(studio, model, body, before=False, modes_only=False):
-    """The Drop by the laws of version 0.1 (Rayleigh damping, soft contacts, the paper's coupling) or of today, which
-    may be left without the sound of the body's acceleration.
-    """
+def hear(studio, model, body, modes_only=False):
+    """The Drop, which may be left without the sound of the body's acceleration."""
     material = catalogue.read()[body.material]
     figures = {"young_pa": material.young_pa, "density_kg_per_m3": material.density_kg_per_m3,
-               **(rayleigh(body.rayleigh_eta) if before else programs.loss_factor(material.loss_factor))}
-    if not before:
-        studio.radiate(model, figures)
-    heard = programs.Heard(model, figures, paper_coupling=before, gaussian=before, modes_only=modes_only)
+               **programs.loss_factor(material.loss_factor)}
+    studio.radiate(model, figures)
+    heard = programs.Heard(model, figures, paper_coupling=False, gaussian=False, modes_only=modes_only)
     mass_kg = body.volume_m3 * material.density_kg_per_m3
-    sound, summary = studio.render(heard, blows(body.surface(), mass_kg, SOFT_S if before else None), 0)
+    sound, summary = studio.render(heard, blows(body.surface(), mass_kg), 0)
     return Drop(body.name, sound, summary, mass_kg)

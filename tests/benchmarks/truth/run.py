@@ -25,12 +25,12 @@ import programs  # noqa: E402
 import rings  # noqa: E402
 
 WINDOW, RANGE_DB = 512, 70
-QUIETEST_DB = -160  # a sound whose loudest point is below it stays black
 
 
-def draw(sounds, path, seconds, columns=4):
+def draw(sounds, path, seconds):
     """Draws the spectrogram of each of [(title, samples)], on a scale of its own loudest point, to a PNG file."""
     pyplot = bench.pyplot()
+    columns = 4
     rows = math.ceil(len(sounds) / columns)
     figure, axes = pyplot.subplots(rows, columns, figsize=(3.1 * columns, 2.1 * rows), sharex=True, sharey=True,
                                    squeeze=False)
@@ -42,7 +42,7 @@ def draw(sounds, path, seconds, columns=4):
         noise = 1e-12 * numpy.random.default_rng(1).standard_normal(len(shown))  # no logarithm of zero
         power, _, _, image = axis.specgram(shown + noise, WINDOW, rings.RATE_HZ, noverlap=3 * WINDOW // 4,
                                            cmap="inferno")
-        loudest = max(10 * numpy.log10(power.max()), QUIETEST_DB)
+        loudest = 10 * numpy.log10(power.max())
         image.set_clim(loudest - RANGE_DB, loudest)
         axis.set_title(title, fontsize=8)
         axis.set_ylim(0, 20000)
@@ -125,11 +125,9 @@ def show_bar(options):
                   options.pictures / "bar.png", bar.SPAN_S)
 
 
-def drop_line(when, drop):
+def drop_line(heard, drop):
     summary = drop.summary
-    if drop.silent():
-        return bench.row(drop.name, when, "silent", *[""] * (len(likeness.OCTAVES_HZ) + 3))
-    return bench.row(drop.name, when, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
+    return bench.row(drop.name, heard, f"{float(summary['peak']) * summary['full_scale_pa']:.2g}",
                          f"{drop.meter_db():.0f}",
                          *(f"{round(float(db))}" for db in drop.octaves_db()), f"{drop.ring_s():.2f}",
                          f"{summary['loudest_momentary_lufs']:.1f}" if "loudest_momentary_lufs" in summary else "-")
@@ -138,27 +136,24 @@ def drop_line(when, drop):
 def show_drops(options):
     print("## Five drops\n")
     octaves = [f"{hz // 1000} kHz, dB" for hz in likeness.OCTAVES_HZ]
-    bench.print_head("body", "laws", "peak, Pa", "dB(A), fast", *octaves, "40 dB down after, s", "loudest 0.4 s, LUFS")
+    bench.print_head("body", "sound", "peak, Pa", "dB(A), fast", *octaves, "40 dB down after, s", "loudest 0.4 s, LUFS")
     with programs.studio() as studio:
         pairs, energies = [], []
         for body in drops.BODIES:
             model = drops.decompose(studio, body)
-            before = drops.hear(studio, model, body, before=True)
             modes = drops.hear(studio, model, body, modes_only=True)
-            after = drops.hear(studio, model, body)
-            pairs += [(f"{body.name}, {laws}", drop.sound)
-                      for laws, drop in (("before", before), ("modes only", modes), ("now", after))]
-            print(drop_line("before", before), drop_line("modes only", modes), drop_line("now", after), sep="\n",
-                  flush=True)
-            energies.append(bench.row(body.name, f"{1000 * after.mass_kg:.0f}", f"{after.first_j():.2g}",
-                                          f"{after.radiated_j():.2g}",
-                                          f"{100 * after.radiated_j() / after.first_j():.2g}"))
-            print(f"{body.name}: acceleration noise over modes, dB: {drops.click_db(modes.sound, after.sound):+.1f}",
+            whole = drops.hear(studio, model, body)
+            pairs += [(f"{body.name}, modes only", modes.sound), (f"{body.name}, whole", whole.sound)]
+            print(drop_line("modes only", modes), drop_line("whole", whole), sep="\n", flush=True)
+            energies.append(bench.row(body.name, f"{1000 * whole.mass_kg:.0f}", f"{whole.first_j():.2g}",
+                                          f"{whole.radiated_j():.2g}",
+                                          f"{100 * whole.radiated_j() / whole.first_j():.2g}"))
+            print(f"{body.name}: acceleration noise over modes, dB: {drops.click_db(modes.sound, whole.sound):+.1f}",
                   file=sys.stderr)
     print()
     print_table([*bench.head("body", "mass, g", "energy of the corner at the first contact, J", "radiated, J",
                                  "radiated, %"), *energies])
-    draw(pairs, options.pictures / "drops.png", 1.0, columns=3)
+    draw(pairs, options.pictures / "drops.png", 1.0)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,22 @@ SurfaceMesh MakeIcosphere(double radius_m, int halvings) {
   return sphere;
 }
 
+std::vector<double> RealHarmonics(int order, const Point& direction) {
+  const double theta = std::acos(direction[2] / Norm(direction));
+  const double phi = std::atan2(direction[1], direction[0]);
+  std::vector<double> harmonics;
+  for (int l = 0; l <= order; ++l) {
+    for (int m = -l; m <= l; ++m) {
+      const auto degree = static_cast<unsigned>(std::abs(m));
+      const double phase = m % 2 == 0 ? 1 : -1;  // of Condon and Shortley
+      const double turned = m < 0 ? std::sin(-m * phi) : std::cos(m * phi);
+      harmonics.push_back((m == 0 ? 1 : std::numbers::sqrt2) * phase * turned *
+                          std::sph_legendre(static_cast<unsigned>(l), degree, theta));
+    }
+  }
+  return harmonics;
+}
+
 double ExactPowerIntegral(int l, double wavenumber, double radius_m) {
   const double x = wavenumber * radius_m;
   const auto hankel = [x](int n) {

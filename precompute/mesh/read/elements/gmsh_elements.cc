@@ -28,10 +28,8 @@ constexpr std::array<GmshKind, 10> kGmshKinds = {{{15, 0, 1, 1},
 std::span<const std::array<size_t, 3>> Pieces(int type) {
   static constexpr std::array<std::array<size_t, 3>, 1> kWhole = {{{0, 1, 2}}};
   static constexpr std::array<std::array<size_t, 3>, 2> kInTwo = {{{0, 1, 2}, {0, 2, 3}}};
-  static constexpr std::array<std::array<size_t, 3>, 4> kInFour = {
-      {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}}};
   if (type == kTriangle3) return kWhole;
-  if (type == kTriangle6) return kInFour;
+  if (type == kTriangle6) return kFaceInFour;
   return kInTwo;
 }
 

@@ -116,7 +116,9 @@ class BodyJoiner {
     std::vector<Triangle> pieces = {{n[0], n[1], n[2]}};
     if (kind.corner_count == 4) pieces.push_back({n[0], n[2], n[3]});
     if (kind.node_count == 6) {
-      pieces = {{n[0], n[3], n[5]}, {n[3], n[1], n[4]}, {n[5], n[4], n[2]}, {n[3], n[4], n[5]}};
+      pieces.clear();
+      pieces.reserve(kFaceInFour.size());
+      for (const auto& [a, b, c] : kFaceInFour) pieces.push_back({n[a], n[b], n[c]});
     }
     file_.AddTriangles({}, pieces);
   }
