@@ -48,7 +48,7 @@ constexpr int kAddingThreadCount = kCallThreadCount - 1;
 constexpr int kWriteThreadCount = 1;
 /// Offline renderings and backups have a lower priority than live sound.
 constexpr int kBackgroundThreadCount = 2;
-constexpr int kBackgroundNiceness = 10;
+constexpr int kBackgroundNiceness = 5;
 
 std::chrono::nanoseconds Duration(double seconds) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(

@@ -28,14 +28,18 @@ void RenderThreads::Stop() {
 }
 
 void RenderThreads::Render(size_t count, absl::FunctionRef<void(size_t, size_t)> render) noexcept {
+  if (count <= 1 || threads_.empty()) {
+    for (size_t section = 0; section < count; ++section) render(0, section);
+    return;
+  }
   render_ = &render;
   count_ = count;
   next_ = 0;
-  busy_count_ = threads_.size();
+  busy_ &= ~kClosed;
   ++round_;
   round_.notify_all();
   RenderSome(0);
-  for (size_t left = busy_count_; left > 0; left = busy_count_) busy_count_.wait(left);
+  for (uint32_t busy = busy_ |= kClosed; busy != kClosed; busy = busy_) busy_.wait(busy);
 }
 
 void RenderThreads::Run(size_t thread) {
@@ -43,8 +47,8 @@ void RenderThreads::Run(size_t thread) {
   for (uint32_t seen = 0;; ++seen) {
     round_.wait(seen);
     if (stopping_) return;
-    RenderSome(thread);
-    if (--busy_count_ == 0) busy_count_.notify_one();
+    if ((busy_++ & kClosed) == 0) RenderSome(thread);
+    if (--busy_ == kClosed) busy_.notify_one();
   }
 }
 

@@ -46,7 +46,10 @@ class RenderThreads final : public SectionThreads {
   size_t count_ = 0;
   std::atomic<size_t> next_{0};
   std::atomic<uint32_t> round_{0};
-  std::atomic<size_t> busy_count_{0};
+  /// The threads that render, and kClosed once no section is left to be begun: Render does not wait
+  /// for a thread to which a busy machine has given no processor since.
+  static constexpr uint32_t kClosed = uint32_t{1} << 31;
+  std::atomic<uint32_t> busy_{kClosed};
   std::atomic<bool> stopping_{false};
   std::vector<std::thread> threads_;
 };
