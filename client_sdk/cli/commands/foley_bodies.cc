@@ -208,7 +208,8 @@ absl::Status SetBody(const FoleyOptions& options, const motion::SceneBody& given
     motion::TurnOutward(body.surface);
     motion::TurnOutward(body.collider);
   }
-  if (options.friction > 0) body.friction = options.friction;
+  // The cone of friction needs a width.
+  if (options.friction) body.friction = std::max(*options.friction, 1e-3);
   ASSIGN_OR_RETURN(sounds.material, MaterialOf(options, body.name, given.material));
   if (sounds.endless || (body.poses.size() == 1 && !IsNamed(options.materials, body.name))) {
     sounds.scenery = std::exchange(sounds.material, "");

@@ -24,7 +24,7 @@ struct FoleyOptions {
   std::optional<double> floor_m;  ///< height of an endless floor against gravity
   std::optional<std::array<double, 3>> gravity_m_per_s2;
   double metres_per_unit = 1;
-  double friction = 0;  ///< zero: that of the file, or 0.6
+  std::optional<double> friction;  ///< that of the file, or 0.6, unless it is given
   std::string silent_striker = "steel";
   double roughness_depth = 0;
   std::string listener;  ///< a camera's name; empty: the first one, if two channels are asked for

@@ -86,7 +86,7 @@ void AddWorld(CLI::App& foley, FoleyOptions& options) {
   TakeWithin(
       *foley.add_option("--friction", options.friction,
                         "The coefficient of friction of all bodies [that of the file, or 0.6]"),
-      0.001, 10);
+      0, 10);
   foley
       .add_option("--striker", options.silent_striker,
                   absl::StrCat("What silent bodies strike like: ", StrikerNames()))

@@ -378,8 +378,9 @@ class FoleyTest(DaemonTest):
         self.table("fall.csv", "--force", *out)
         self.assertEqual(impacts(self.folder / "none.contacts"), [])
 
-    def python_contacts(self, **options):
+    def python_contacts(self, stretch=1, **options):
         times, height = heights()
+        times = times * stretch
         return carillon.motion.contacts(
             {"Bar": carillon.motion.Body(meshes.centred_box(SIDES_M), "structural_steel")}, times,
             {"Bar": ([(0, 0, z) for z in height], [(1, 0, 0, 0)] * len(times))},
@@ -390,8 +391,14 @@ class FoleyTest(DaemonTest):
         found.trace.write(self.folder / "python.contacts")
         self.check_impacts(self.folder / "python.contacts")
         self.assertLess(found.unexplained, 1e-6)
+        without_friction = self.python_contacts(floor=0, friction=0)
+        self.assertEqual(len(without_friction.trace.steps), len(found.trace.steps))
+        self.assertLess(without_friction.unexplained, 1e-6)
         with self.assert_refused("MOTION_WITHOUT_CONTACT"):
             self.python_contacts()
+        with self.assertRaises(carillon.CarillonError) as refused:
+            self.python_contacts(stretch=numpy.nan, floor=0)
+        self.assertNotIn(".npz", refused.exception.message)
 
 
 # A job lasts as long as the folder has the file "slow".

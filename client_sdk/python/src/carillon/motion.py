@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 from carillon import programs
+from carillon.errors import CarillonError
 from carillon.traces import Trace
 
 
@@ -74,7 +75,13 @@ def contacts(bodies: Mapping[str, Body], times: Sequence[float], poses: Mapping[
         words += [] if friction is None else ["--friction", str(friction)]
         words += ["--force"] if force else []
         trace = folder / "found.contacts"
-        report = programs.run(program, server, "foley", folder / "poses.npz", "--trace", trace, *words).stderr
+        try:
+            report = programs.run(program, server, "foley", folder / "poses.npz", "--trace", trace, *words).stderr
+        except CarillonError as error:
+            message = error.message.replace(str(folder / "poses.npz"), "poses")
+            for number, body_name in enumerate(names):
+                message = message.replace(str(folder / f"{number}.obj"), f"the surface of {body_name}")
+            raise CarillonError(error.reason, message) from None
         figures = re.search(r"unexplained (\S+) %, ambiguous (\S+) %", report)
         assert figures, report
         return Found(Trace.read(trace), float(figures[1]) / 100, float(figures[2]) / 100, report)
