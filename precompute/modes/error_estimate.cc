@@ -27,8 +27,6 @@
 namespace carillon::precompute {
 namespace {
 
-using Barycentric = Eigen::Vector4d;
-
 /// The constant C of the header, for each order of elements.
 constexpr double kLinearConstant = 1.3;
 constexpr double kQuadraticConstant = 1.8;
@@ -85,7 +83,6 @@ class ReferenceIntegrals {
   std::vector<Mixed> mixed;          ///< [added * #base + base]: products of derivatives
   std::vector<Eigen::Matrix4d> own;  ///< [added]: each added function with itself
   Eigen::MatrixXd mass;              ///< #added by #base
-
 };
 
 /// Returns a(f, g) of two functions, a 3 by 3 block for their components, where `integrals` has the

@@ -166,7 +166,9 @@ constexpr Known kSize{"size", "--size",
                       [](const Refused& r) { return SizeInBand(r).empty(); }};
 constexpr Known kHigherBand{
     "max_frequency_hz", "--band", "reaches the first mode; a higher end finds more modes",
-    [](const Refused& refused) { return RoundedWhole(1.05 * refused.Figure("first_mode_hz"), std::ceil); },
+    [](const Refused& refused) {
+      return RoundedWhole(1.05 * refused.Figure("first_mode_hz"), std::ceil);
+    },
     [](const Refused& r) {
       const double first_hz = r.Figure("first_mode_hz");
       return first_hz < std::max(r.request.min_frequency_hz(), kUsualLowestHz);

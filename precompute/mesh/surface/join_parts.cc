@@ -159,7 +159,8 @@ std::vector<SurfaceMesh> PiecesOf(const SurfaceMesh& region) {
   if (pieces.empty()) return {region};  // CheckSurface refuses it by name
   std::vector<SurfaceMesh> surfaces;
   surfaces.reserve(pieces.size());
-  for (const auto& [outer, triangles] : pieces) surfaces.push_back(PartOf(region.vertices, triangles));
+  for (const auto& [outer, triangles] : pieces)
+    surfaces.push_back(PartOf(region.vertices, triangles));
   return surfaces;
 }
 
