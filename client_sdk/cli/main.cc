@@ -55,16 +55,16 @@ void AddCollect(CLI::App& db, Program& program) {
                   "Delete only the meshes that no model and no job refers to");
   budget.require_option(1);
   collect.add_flag("--dry-run", *dry_run, "Only say what would be deleted");
-  collect.callback([&program, budget_mib, delete_unpinned, unused_meshes, dry_run] {
-    program.command = [&program, budget_mib, delete_unpinned, unused_meshes, dry_run] {
-      v1::CollectGarbageRequest request;
-      request.set_budget_bytes(*budget_mib << 20U);
-      request.set_delete_unpinned(*delete_unpinned);
-      request.set_delete_unused_meshes(*unused_meshes);
-      request.set_dry_run(*dry_run);
-      return CollectGarbage(*program.Daemon(), request, program.json);
-    };
-  });
+  SetRun(collect, program,
+         [budget_mib, delete_unpinned, unused_meshes, dry_run](const client::Client& daemon,
+                                                               bool json) {
+           v1::CollectGarbageRequest request;
+           request.set_budget_bytes(*budget_mib << 20U);
+           request.set_delete_unpinned(*delete_unpinned);
+           request.set_delete_unused_meshes(*unused_meshes);
+           request.set_dry_run(*dry_run);
+           return CollectGarbage(daemon, request, json);
+         });
 }
 
 void AddDatabase(CLI::App& app, Program& program) {
@@ -72,16 +72,12 @@ void AddDatabase(CLI::App& app, Program& program) {
   CLI::App& db =
       *app.add_subcommand("db", "Look after the database of the daemon (for administrators)");
   db.require_subcommand(1);
-  db.add_subcommand("stats", "Show the number and the size of models, meshes and jobs")
-      ->callback([&program] {
-        program.command = [&program] { return ShowDatabaseStats(*program.Daemon(), program.json); };
-      });
+  SetRun(*db.add_subcommand("stats", "Show the number and the size of models, meshes and jobs"),
+         program, ShowDatabaseStats);
   CLI::App& backup = *db.add_subcommand("backup", "Write a copy of the database to a file");
   backup.add_option("file", *file, "The file to write")->required();
-  backup.callback([&program, file] {
-    program.command = [&program, file] {
-      return BackUpDatabase(*program.Daemon(), *file, program.json);
-    };
+  SetRun(backup, program, [file](const client::Client& daemon, bool json) {
+    return BackUpDatabase(daemon, *file, json);
   });
   AddCollect(db, program);
 }
@@ -100,17 +96,14 @@ void AddTransfer(CLI::App& app, Program& program) {
              0.001, 1e9, "leave it out for a time by the size of the model, 20 to 600 s");
   create.add_flag("--wait,!--no-wait", options->wait, "Wait until it is stored [no]");
   AddMaterial(create, options->material);
-  create.callback([&program, options] {
-    program.command = [&program, options] {
-      return CreateTransfer(*program.Daemon(), *options, program.json);
-    };
+  SetRun(create, program, [options](const client::Client& daemon, bool json) {
+    return CreateTransfer(daemon, *options, json);
   });
 }
 
 void AddDoctor(CLI::App& app, Program& program) {
-  app.add_subcommand("doctor", "Check the health of the daemon, and say what to do")->callback([&] {
-    program.command = [&] { return Diagnose(*program.Daemon(), program.json); };
-  });
+  SetRun(*app.add_subcommand("doctor", "Check the health of the daemon, and say what to do"),
+         program, Diagnose);
 }
 
 /// Adds the options of the object that is struck.

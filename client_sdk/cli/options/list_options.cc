@@ -18,13 +18,15 @@ namespace carillon::cli {
 namespace {
 
 /// Adds a command about one thing, which `description` says how to name.
-template <class Run>
-void AddAbout(CLI::App& parent, const std::string& name, const std::string& text,
-              const std::string& description, Run run) {
+void AddAbout(CLI::App& parent, Program& program, const std::string& name, const std::string& text,
+              const std::string& description,
+              absl::Status (*run)(const client::Client&, const std::string&, bool)) {
   auto thing = std::make_shared<std::string>();
   CLI::App& command = *parent.add_subcommand(name, text);
   command.add_option(parent.get_name(), *thing, description)->required();
-  command.callback([run, thing] { run(*thing); });
+  SetRun(command, program, [run, thing](const client::Client& daemon, bool json) {
+    return run(daemon, *thing, json);
+  });
 }
 
 /// The options that choose jobs by state and label.
@@ -66,10 +68,8 @@ void AddJobList(CLI::App& job, Program& program) {
   auto choice = std::make_shared<JobChoice>();
   CLI::App& list = *job.add_subcommand("list", "List the jobs, newest first");
   AddJobChoice(list, *choice);
-  list.callback([&program, choice] {
-    program.command = [&program, choice] {
-      return ListJobs(*program.Daemon(), RequestOf<v1::ListJobsRequest>(*choice), program.json);
-    };
+  SetRun(list, program, [choice](const client::Client& daemon, bool json) {
+    return ListJobs(daemon, RequestOf<v1::ListJobsRequest>(*choice), json);
   });
 }
 
@@ -80,11 +80,9 @@ void AddJobWatch(CLI::App& job, const std::string& named, Program& program) {
       "watch", "Show the progress of a job until it ends, or the changes of all jobs");
   watch.add_option("job", *text, named + " [all jobs, until the program is stopped]");
   AddJobChoice(watch, *choice);
-  watch.callback([&program, text, choice] {
-    program.command = [&program, text, choice] {
-      if (!text->empty()) return WatchJob(*program.Daemon(), *text, program.json);
-      return WatchJobs(*program.Daemon(), RequestOf<v1::WatchJobsRequest>(*choice), program.json);
-    };
+  SetRun(watch, program, [text, choice](const client::Client& daemon, bool json) {
+    if (!text->empty()) return WatchJob(daemon, *text, json);
+    return WatchJobs(daemon, RequestOf<v1::WatchJobsRequest>(*choice), json);
   });
 }
 
@@ -95,17 +93,13 @@ void AddJob(CLI::App& app, Program& program) {
                        ->require_subcommand(1);
   AddJobList(job, program);
   const std::string named = "The name, the label, or the first digits of the digest of a job";
-  AddAbout(job, "show", "Show a job", named, [&program](const std::string& text) {
-    program.command = [&program, text] { return ShowJob(*program.Daemon(), text, program.json); };
-  });
+  AddAbout(job, program, "show", "Show a job", named, ShowJob);
   AddJobWatch(job, named, program);
   auto cancelled = std::make_shared<std::vector<std::string>>();
   CLI::App& cancel = *job.add_subcommand("cancel", "Cancel jobs that have not ended");
   cancel.add_option("job", *cancelled, named)->required();
-  cancel.callback([&program, cancelled] {
-    program.command = [&program, cancelled] {
-      return CancelJobs(*program.Daemon(), *cancelled, program.json);
-    };
+  SetRun(cancel, program, [cancelled](const client::Client& daemon, bool json) {
+    return CancelJobs(daemon, *cancelled, json);
   });
 }
 
@@ -137,15 +131,9 @@ void AddExplain(CLI::App& app, Program& program) {
 void AddScenes(CLI::App& app, Program& program) {
   CLI::App& scene =
       *app.add_subcommand("scene", "List, record and delete scenes")->require_subcommand(1);
-  scene.add_subcommand("list", "List the scenes and their objects")->callback([&program] {
-    program.command = [&program] { return ListScenes(*program.Daemon(), program.json); };
-  });
-  AddAbout(scene, "delete", "Fade out the objects of a scene and delete it",
-           "The name or the number of a scene", [&program](const std::string& text) {
-             program.command = [&program, text] {
-               return DeleteScene(*program.Daemon(), text, program.json);
-             };
-           });
+  SetRun(*scene.add_subcommand("list", "List the scenes and their objects"), program, ListScenes);
+  AddAbout(scene, program, "delete", "Fade out the objects of a scene and delete it",
+           "The name or the number of a scene", DeleteScene);
   AddSceneRecord(scene, program);
 }
 

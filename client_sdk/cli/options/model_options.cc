@@ -101,10 +101,8 @@ void AddModelShow(CLI::App& app, Program& program) {
       "show", "Show a model and, with a material, its frequencies and decay rates");
   show.add_option("model", *model, kModelName)->required();
   AddMaterial(show, *material);
-  show.callback([&program, model, material] {
-    program.command = [&program, model, material] {
-      return ShowModel(*program.Daemon(), *model, *material, program.json);
-    };
+  SetRun(show, program, [model, material](const client::Client& daemon, bool json) {
+    return ShowModel(daemon, *model, *material, json);
   });
 }
 
@@ -112,10 +110,8 @@ void AddModelDelete(CLI::App& app, Program& program) {
   auto models = std::make_shared<std::vector<std::string>>();
   CLI::App& command = *app.add_subcommand("delete", "Delete models");
   command.add_option("model", *models, kModelName)->required();
-  command.callback([&program, models] {
-    program.command = [&program, models] {
-      return DeleteModels(*program.Daemon(), *models, program.json);
-    };
+  SetRun(command, program, [models](const client::Client& daemon, bool json) {
+    return DeleteModels(daemon, *models, json);
   });
 }
 
@@ -163,10 +159,8 @@ void AddModelList(CLI::App& app, Program& program) {
           "--page-token", [filter](const std::string& token) { filter->set_page_token(token); },
           "List the page with this token")
       ->needs("--page-size");
-  list.callback([&program, filter] {
-    program.command = [&program, filter] {
-      return ListModels(*program.Daemon(), *filter, program.json);
-    };
+  SetRun(list, program, [filter](const client::Client& daemon, bool json) {
+    return ListModels(daemon, *filter, json);
   });
 }
 
@@ -194,12 +188,10 @@ void AddModelTag(CLI::App& app, Program& program) {
       "--pin,!--unpin", [change](int64_t count) { change->set_pinned(count > 0); },
       "Keep the model from garbage collection, or no longer");
   AddMaterial(tag, *material);
-  tag.callback([&program, model, change, material] {
-    program.command = [&program, model, change, material] {
-      ASSIGN_OR_RETURN(const v1::Material objects, ToMaterial(*material));
-      if (objects.ByteSizeLong() > 0) *change->mutable_material() = objects;
-      return UpdateModel(*program.Daemon(), *model, *change, program.json);
-    };
+  SetRun(tag, program, [model, change, material](const client::Client& daemon, bool json) {
+    ASSIGN_OR_RETURN(const v1::Material objects, ToMaterial(*material));
+    if (objects.ByteSizeLong() > 0) *change->mutable_material() = objects;
+    return UpdateModel(daemon, *model, *change, json);
   });
 }
 
@@ -241,10 +233,8 @@ void AddModelImport(CLI::App& app, Program& program) {
       "--pick", options->pick,
       "A model of a glTF that has several: its name or number, or the name of a node");
   AddMaterial(command, options->material);
-  command.callback([&program, options] {
-    program.command = [&program, options] {
-      return ImportModel(*program.Daemon(), *options, program.json);
-    };
+  SetRun(command, program, [options](const client::Client& daemon, bool json) {
+    return ImportModel(daemon, *options, json);
   });
 }
 
@@ -265,10 +255,8 @@ void AddModelTune(CLI::App& app, Program& program) {
                   "of its file that is longest or shortest), or the axis x, y or z [size]")
       ->check(CLI::IsMember({"size", "length", "thickness", "x", "y", "z"}).description(""));
   AddMaterial(command, options->material);
-  command.callback([&program, options] {
-    program.command = [&program, options] {
-      return TuneModel(*program.Daemon(), *options, program.json);
-    };
+  SetRun(command, program, [options](const client::Client& daemon, bool json) {
+    return TuneModel(daemon, *options, json);
   });
 }
 

@@ -51,10 +51,8 @@ void AddVolume(CLI::App& app, Program& program) {
             options->solo)
       ->needs(scene);
   AddSwitch(volume, "no-solo", "End that", options->solo, false)->needs(scene)->excludes("--solo");
-  volume.callback([&program, options] {
-    program.command = [&program, options] {
-      return ChangeVolume(*program.Daemon(), *options, program.json);
-    };
+  SetRun(volume, program, [options](const client::Client& daemon, bool json) {
+    return ChangeVolume(daemon, *options, json);
   });
 }
 
@@ -62,10 +60,8 @@ void AddStop(CLI::App& app, Program& program) {
   auto scene = std::make_shared<std::string>();
   CLI::App& stop = *app.add_subcommand("stop", "Silence all that sounds, with a short fade");
   stop.add_option("scene", *scene, "The name or the number of a scene [all of your scenes]");
-  stop.callback([&program, scene] {
-    program.command = [&program, scene] {
-      return StopSound(*program.Daemon(), *scene, program.json);
-    };
+  SetRun(stop, program, [scene](const client::Client& daemon, bool json) {
+    return StopSound(daemon, *scene, json);
   });
 }
 

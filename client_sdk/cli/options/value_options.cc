@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
@@ -45,6 +46,13 @@ std::string WhyNotWritten(const std::string& path, const std::vector<std::string
   if (suffix.empty() || std::ranges::find(suffixes, suffix) != suffixes.end()) return "";
   return absl::StrCat("\"", path, "\" must end with ", absl::StrJoin(suffixes, ", "),
                       ": no other format is written");
+}
+
+void SetRun(CLI::App& command, Program& program,
+            std::function<absl::Status(const client::Client& daemon, bool json)> run) {
+  command.callback([&program, run = std::move(run)] {
+    program.command = [&program, run] { return run(*program.Daemon(), program.json); };
+  });
 }
 
 void CheckJson(const Program& program, const std::string& out) {

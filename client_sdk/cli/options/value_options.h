@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "client_sdk/cli/commands/program.h"
 
 namespace CLI {  // NOLINT(readability-identifier-naming): as the library has it
+class App;
 class Option;
-}
+}  // namespace CLI
 
 namespace carillon::cli {
 
@@ -36,6 +38,10 @@ void TakeSeconds(CLI::Option& option);
 /// `suffixes`, such as ".wav". Small and capital letters are equal. Returns an empty string if the
 /// suffix is one of them, or if the path has no suffix.
 std::string WhyNotWritten(const std::string& path, const std::vector<std::string>& suffixes);
+
+/// Lets a command call `run` with the daemon and whether results are printed as JSON.
+void SetRun(CLI::App& command, Program& program,
+            std::function<absl::Status(const client::Client& daemon, bool json)> run);
 
 /// Throws a CLI::ValidationError if JSON is asked for while stdout, "-" as `out`, has the sound.
 void CheckJson(const Program& program, const std::string& out);
