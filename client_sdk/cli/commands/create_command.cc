@@ -268,9 +268,9 @@ class ModelCreation {
     last_error_ = error;
     if (ToErrorInfo(error).reason() == "SERVER_UNAVAILABLE") return error;
     const std::string& file = FileOf(requested);
-    const std::string members = MembersJson({{"file", file}, {"index", uint64_t{requested.index}}});
-    const std::string row =
-        absl::StrCat(members.substr(0, members.size() - 1), ",", ErrorJson(error).substr(1));
+    const std::string row = MembersJson({{"file", file},
+                                         {"index", uint64_t{requested.index}},
+                                         {"error", JsonText{MessageJson(ToErrorInfo(error))}}});
     if (options_.files.size() == 1) return WriteRow(row);  // the command ends with the error
     absl::FPrintF(stderr, "carillon: %s:\n", EscapedText(file));
     (void)Report(error);

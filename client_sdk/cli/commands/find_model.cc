@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
 #include "client_sdk/cli/output/job_progress.h"
+#include "client_sdk/interchange/model_records.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/limits.h"
 #include "proto/cpp/near_names.h"
@@ -141,6 +142,20 @@ absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::s
   ASSIGN_OR_RETURN(const auto models, daemon.ListModalModels());
   auto found = Choose(models, text, {kModels, "MODAL_MODEL_NOT_FOUND", "NAME_AMBIGUOUS", "model"});
   return absl::IsNotFound(found.status()) ? WhyNotFound(daemon, text, found.status()) : found;
+}
+
+absl::StatusOr<v1::ModalModelSummary> FindSummary(const client::Client& daemon,
+                                                  const std::string& text) {
+  ASSIGN_OR_RETURN(const std::string name, FindModel(daemon, text));
+  return daemon.GetModalModel(name);
+}
+
+absl::StatusOr<interchange::StoredModel> Fetch(const client::Client& daemon,
+                                               const std::string& name) {
+  interchange::ModelAssembler assembler;
+  RETURN_IF_ERROR(daemon.ExportModalModel(
+      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); }));
+  return assembler.Finish();
 }
 
 std::string SharedLabel(const client::Client& daemon, const v1::ModalModelSummary& model) {

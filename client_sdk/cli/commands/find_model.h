@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/client.h"
+#include "client_sdk/interchange/stored_model.h"
 
 namespace carillon::cli {
 
@@ -13,6 +14,15 @@ namespace carillon::cli {
 /// job that has yet to make the model, if there is one), InvalidArgument (NAME_AMBIGUOUS),
 /// and those of Client::ListModalModels.
 absl::StatusOr<std::string> FindModel(const client::Client& daemon, const std::string& text);
+
+/// Returns the model that `text` means. Errors: those of FindModel and of Client::GetModalModel.
+absl::StatusOr<v1::ModalModelSummary> FindSummary(const client::Client& daemon,
+                                                  const std::string& text);
+
+/// Returns the content of the model "modalModels/{digest}". Errors: those of
+/// Client::ExportModalModel and of ModelAssembler.
+absl::StatusOr<interchange::StoredModel> Fetch(const client::Client& daemon,
+                                               const std::string& name);
 
 /// Returns a sentence that says that other models have the label of `model`, too, and how to name
 /// each. Returns an empty string if no other model has the label.

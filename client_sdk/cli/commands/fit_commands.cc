@@ -100,13 +100,6 @@ absl::StatusOr<Source> ReadSource(const std::vector<std::string>& files) {
   return source;
 }
 
-/// The model of a body, with a transfer for about the speed found if there was one.
-absl::StatusOr<v1::ModalModelSummary> ModelOf(const client::Client& daemon,
-                                              const std::string& text) {
-  ASSIGN_OR_RETURN(const std::string name, FindModel(daemon, text));
-  return daemon.GetModalModel(name);
-}
-
 v1::Material MaterialOf(const fit::MaterialFit& fit) {
   const auto rounded = [](double value) {
     return std::strtod(absl::StrFormat("%.6g", value).c_str(), nullptr);
@@ -540,7 +533,7 @@ absl::Status FitMaterialTo(const client::Client& daemon, const FitOptions& optio
   std::vector<Source> sources;
   std::vector<v1::ModalModelSummary> models;
   for (const std::vector<std::string>& words : bodies) {
-    ASSIGN_OR_RETURN(v1::ModalModelSummary model, ModelOf(daemon, words[0]));
+    ASSIGN_OR_RETURN(v1::ModalModelSummary model, FindSummary(daemon, words[0]));
     ASSIGN_OR_RETURN(fit::ModelLines lines, LinesOf(model));
     ASSIGN_OR_RETURN(Source source, ReadSource({words.begin() + 1, words.end()}));
     source.body.name = words[0];

@@ -3,10 +3,8 @@
 
 #include <google/protobuf/text_format.h>
 
-#include <fstream>
-#include <iterator>
-
 #include "absl/strings/str_cat.h"
+#include "client_sdk/cli/output/output.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/loss_factor.h"
 #include "proto/cpp/material_catalogue.h"
@@ -18,12 +16,7 @@ namespace carillon::cli {
 namespace {
 
 absl::StatusOr<v1::Material> ReadMaterial(const std::string& path) {
-  std::ifstream file(path);
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(path, " cannot be read: see its name and rights"));
-  }
+  ASSIGN_OR_RETURN(const std::string text, ReadText(path));
   v1::Material material;
   if (google::protobuf::TextFormat::ParseFromString(text, &material)) return material;
   return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_MATERIAL",

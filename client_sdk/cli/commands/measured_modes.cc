@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -115,16 +114,12 @@ absl::StatusOr<Extracted> ExtractFrom(const std::vector<std::string>& paths) {
 }
 
 absl::StatusOr<std::vector<fit::MeasuredMode>> ReadModes(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) {
-    return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                   absl::StrCat(path, " cannot be read: see its name and rights"));
-  }
+  ASSIGN_OR_RETURN(const std::string bytes, ReadText(path));
   std::vector<fit::MeasuredMode> modes;
   std::vector<Column> columns;
-  std::string line;
-  for (size_t number = 1; std::getline(file, line); ++number) {
-    absl::string_view text = line;
+  size_t number = 0;
+  for (absl::string_view text : absl::StrSplit(bytes, '\n')) {
+    ++number;
     if (number == 1) absl::ConsumePrefix(&text, "\xEF\xBB\xBF");  // a byte order mark
     text = absl::StripAsciiWhitespace(text);
     if (text.empty() || text[0] == '#') continue;

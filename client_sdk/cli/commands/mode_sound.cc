@@ -71,6 +71,12 @@ std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Mat
   return modes;
 }
 
+double CompleteToHz(const v1::ModalModelSummary& model, const v1::Material& material) {
+  const double lambda =
+      model.header().complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
+  return std::sqrt(lambda) / (2 * std::numbers::pi);
+}
+
 std::vector<JsonMember> ModeMembers(const std::vector<ModeSound>& modes, double low_hz,
                                     double high_hz) {
   std::vector<double> frequencies_hz, t60_s;

@@ -45,6 +45,9 @@ bool HasTransfer(const v1::ModalModelSummary& model, const v1::Material& materia
 std::vector<ModeSound> ModesOf(const v1::ModalModelSummary& model, const v1::Material& material,
                                double size = 1);
 
+/// Returns the frequency, Hz, up to which the model has all modes of a body of `material`.
+double CompleteToHz(const v1::ModalModelSummary& model, const v1::Material& material);
+
 /// Returns the members "frequencies_hz" (natural) and "t60_s" of the modes from `low_hz` to
 /// `high_hz`. The T60 of an undamped mode is infinite, which JSON writes as null.
 std::vector<JsonMember> ModeMembers(const std::vector<ModeSound>& modes, double low_hz = 0,

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -102,13 +101,6 @@ void PrintModes(const std::vector<ModeSound>& modes) {
     absl::PrintF("%5d %14.3f %14.3f %12.4f%s %9.3f\n", i + 1, mode.natural_hz, mode.damped_hz,
                  mode.material_decay_per_s, by_radiation, mode.T60());
   }
-}
-
-/// Returns the frequency, Hz, up to which the model has all modes of a body of `material`.
-double CompleteToHz(const v1::ModalModelSummary& model, const v1::Material& material) {
-  const double lambda =
-      model.header().complete_to_eigenvalue() * material.young_pa() / material.density_kg_per_m3();
-  return std::sqrt(lambda) / (2 * std::numbers::pi);
 }
 
 /// Prints up to where the model has all modes of a body of `material`.
@@ -215,8 +207,7 @@ absl::Status ListModels(const client::Client& daemon, const v1::ListModalModelsR
 
 absl::Status ShowModel(const client::Client& daemon, const std::string& text,
                        const MaterialFigures& figures, bool json) {
-  ASSIGN_OR_RETURN(const auto name, FindModel(daemon, text));
-  ASSIGN_OR_RETURN(const auto model, daemon.GetModalModel(name));
+  ASSIGN_OR_RETURN(const auto model, FindSummary(daemon, text));
   ASSIGN_OR_RETURN(const auto given, ToMaterial(figures));
   const bool is_given = given.ByteSizeLong() > 0;
   const v1::Material& chosen = is_given ? given : model.material();

@@ -54,13 +54,6 @@ absl::StatusOr<v1::Material> MaterialFor(const std::string& format,
                               "' holds a model for every material; leave the material out"));
 }
 
-absl::StatusOr<StoredModel> Fetch(const client::Client& daemon, const std::string& name) {
-  interchange::ModelAssembler assembler;
-  RETURN_IF_ERROR(daemon.ExportModalModel(
-      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); }));
-  return assembler.Finish();
-}
-
 absl::Status WriteGltf(const client::Client& daemon, const std::string& name,
                        const std::string& file, const v1::Material& given, bool binary) {
   ASSIGN_OR_RETURN(const v1::ModalModelSummary summary, daemon.GetModalModel(name));

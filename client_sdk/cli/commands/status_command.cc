@@ -55,9 +55,7 @@ absl::Status ShowStatus(const client::Client& daemon, const std::string& server,
   ASSIGN_OR_RETURN(const v1::GetMixerResponse mixer, daemon.GetMixer());
   ASSIGN_OR_RETURN(const v1::GetServerInfoResponse info, daemon.GetServerInfo());
   if (json) {
-    std::string text = MessageJson(mixer);
-    text.back() = ',';  // in place of the brace that closes the object
-    absl::PrintF("%s\"server\":%s}\n", text, MessageJson(info));
+    absl::PrintF("%s\n", MessageJson(mixer, {{"server", JsonText{MessageJson(info)}}}));
     return absl::OkStatus();
   }
   absl::PrintF("carillond %s at %s\n", mixer.version(), server);

@@ -232,8 +232,8 @@ absl::Status StrikeIn(const client::Client& daemon, const std::string& scene,
 /// Renders the strike to a file, and plays nothing.
 absl::Status StrikeToFile(const client::Client& daemon, const StrikeOptions& options, bool json) {
   v1::SoundingObject object;
-  ASSIGN_OR_RETURN(*object.mutable_modal_model(), FindModel(daemon, options.model));
-  ASSIGN_OR_RETURN(const v1::ModalModelSummary model, daemon.GetModalModel(object.modal_model()));
+  ASSIGN_OR_RETURN(const v1::ModalModelSummary model, FindSummary(daemon, options.model));
+  object.set_modal_model(model.name());
   ASSIGN_OR_RETURN(*object.mutable_material(), ToMaterial(options.material));
   if (object.material().ByteSizeLong() == 0) *object.mutable_material() = model.material();
   ASSIGN_OR_RETURN(const v1::Material material, MatchedMaterial(model, object.material()));

@@ -5,8 +5,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
@@ -18,8 +16,8 @@
 #include "absl/strings/string_view.h"
 #include "carillon/contact_trace.h"
 #include "client_sdk/cli/commands/commands.h"
+#include "client_sdk/cli/commands/find_model.h"
 #include "client_sdk/cli/output/output.h"
-#include "client_sdk/interchange/model_records.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/program/child_process.h"
 #include "proto/cpp/status_macros.h"
@@ -49,11 +47,8 @@ absl::StatusOr<std::string> EmptyPage() {
 }
 
 absl::StatusOr<std::string> Base64OfFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string bytes(std::istreambuf_iterator<char>(file), {});
-  if (file) return absl::Base64Escape(bytes);
-  return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
-                 absl::StrCat(path, " cannot be read for the page"));
+  ASSIGN_OR_RETURN(const std::string bytes, ReadText(path));
+  return absl::Base64Escape(bytes);
 }
 
 template <typename T>
@@ -72,10 +67,7 @@ absl::StatusOr<std::string> SurfacesOf(const client::Client& daemon, const std::
     if (!record) return members;
     const std::string& name = record->object().modal_model();
     if (name.empty() || !names.insert(name).second) continue;
-    interchange::ModelAssembler assembler;
-    RETURN_IF_ERROR(daemon.ExportModalModel(
-        name, [&](const v1::ModalModelRecord& part) { return assembler.Append(part); }));
-    ASSIGN_OR_RETURN(const interchange::StoredModel model, assembler.Finish());
+    ASSIGN_OR_RETURN(const interchange::StoredModel model, Fetch(daemon, name));
     absl::StrAppend(&members, members.empty() ? "" : ",", "\"", name, R"(":{"vertices":")",
                     Base64Of(model.vertices), R"(","triangles":")", Base64Of(model.triangles),
                     R"("})");

@@ -13,7 +13,6 @@
 #include "client_sdk/cli/commands/mode_sound.h"
 #include "client_sdk/cli/output/job_progress.h"
 #include "client_sdk/cli/output/output.h"
-#include "client_sdk/interchange/model_records.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/material_catalogue.h"
 #include "proto/cpp/program/escaped_text.h"
@@ -115,9 +114,7 @@ class Body {
     request.set_mesh_format("obj");
     ASSIGN_OR_RETURN(*request.mutable_settings(), Settings(scale));
     *request.mutable_material() = material_;
-    const double complete_hz = std::sqrt(model_.header().complete_to_eigenvalue() *
-                                         material_.young_pa() / material_.density_kg_per_m3()) /
-                               (2 * M_PI);
+    const double complete_hz = CompleteToHz(model_, material_);
     // A model of a narrower band than the open one was asked for with that band.
     if (complete_hz < kHighest_hz && model_.header().lowered_from_mode_count() == 0) {
       request.set_max_frequency_hz(complete_hz / std::min(1.0, scale));
@@ -308,8 +305,7 @@ void PrintTuned(const Body& body, const Tuned& tuned, double before_hz, const Tu
 }  // namespace
 
 absl::Status TuneModel(const client::Client& daemon, const TuneOptions& options, bool json) {
-  ASSIGN_OR_RETURN(const std::string name, FindModel(daemon, options.model));
-  ASSIGN_OR_RETURN(const v1::ModalModelSummary model, daemon.GetModalModel(name));
+  ASSIGN_OR_RETURN(const v1::ModalModelSummary model, FindSummary(daemon, options.model));
   ASSIGN_OR_RETURN(const v1::Material given, ToMaterial(options.material));
   if (given.ByteSizeLong() == 0 && !model.has_material()) {
     return Refusal(absl::StatusCode::kInvalidArgument, "INVALID_SETTINGS",
@@ -321,10 +317,7 @@ absl::Status TuneModel(const client::Client& daemon, const TuneOptions& options,
   if (options.by == "size") return TuneSize(model, material, options, json);
   ASSIGN_OR_RETURN(const double before_hz, FrequencyOf(model, material, options.mode));
   material.set_poisson_ratio(model.header().settings().poisson_ratio());
-  interchange::ModelAssembler assembler;
-  RETURN_IF_ERROR(daemon.ExportModalModel(
-      name, [&](const v1::ModalModelRecord& record) { return assembler.Append(record); }));
-  ASSIGN_OR_RETURN(StoredModel surface, assembler.Finish());
+  ASSIGN_OR_RETURN(StoredModel surface, Fetch(daemon, model.name()));
   Body body(daemon, model, material, std::move(surface));
   RETURN_IF_ERROR(body.ChooseAxis(options.by));
   // Bending goes with thickness/length^2; for other axes the first probe tells.

@@ -118,6 +118,4 @@ std::string MessageJson(const Message& message, const std::vector<JsonMember>& m
   return JsonLine(object);
 }
 
-std::string MessageJson(const Message& message) { return JsonLine(ToJson(message)); }
-
 }  // namespace carillon::cli

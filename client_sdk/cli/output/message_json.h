@@ -10,11 +10,6 @@
 
 namespace carillon::cli {
 
-/// Returns a message as JSON with the field names of the .proto. In contrast to protobuf's own
-/// JSON, 64-bit integers are numbers. Every field without presence is there, also with its default
-/// value. The message must have no bytes and no Any.
-std::string MessageJson(const google::protobuf::Message& message);
-
 /// A value that is JSON already.
 struct JsonText {
   std::string text;
@@ -33,8 +28,10 @@ struct JsonMember {
 /// finite is null.
 std::string MembersJson(const std::vector<JsonMember>& members);
 
-/// Returns a message as MessageJson does, followed by the members.
+/// Returns a message as JSON with the field names of the .proto, followed by the members. In
+/// contrast to protobuf's own JSON, 64-bit integers are numbers. Every field without presence is
+/// there, also with its default value. The message must have no bytes and no Any.
 std::string MessageJson(const google::protobuf::Message& message,
-                        const std::vector<JsonMember>& members);
+                        const std::vector<JsonMember>& members = {});
 
 }  // namespace carillon::cli

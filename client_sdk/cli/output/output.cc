@@ -2,6 +2,7 @@
 #include "client_sdk/cli/output/output.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -23,6 +24,18 @@ absl::Status FlushOutput() {
                  absl::StrCat("stdout: ", why,
                               "; a part of the output is lost: send it to a file or a pipe that "
                               "takes it"));
+}
+
+absl::StatusOr<std::string> ReadText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 65536> piece;
+  std::string text;
+  while (file.read(piece.data(), piece.size()) || file.gcount() > 0) {
+    text.append(piece.data(), static_cast<size_t>(file.gcount()));
+  }
+  if (file.eof()) return text;  // a folder can be opened, and not read
+  return Refusal(absl::StatusCode::kNotFound, "FILE_NOT_FOUND",
+                 absl::StrCat(path, " cannot be read: see its name and rights"));
 }
 
 absl::Status WriteText(const std::string& path, absl::string_view text) {
@@ -49,7 +62,7 @@ int Report(const absl::Status& status, bool json) {
 }
 
 std::string ErrorJson(const absl::Status& status) {
-  return absl::StrCat("{\"error\":", MessageJson(ToErrorInfo(status)), "}");
+  return MembersJson({{"error", JsonText{MessageJson(ToErrorInfo(status))}}});
 }
 
 void PrintJson(const google::protobuf::Message& message) {

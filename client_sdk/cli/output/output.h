@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "client_sdk/cli/output/message_json.h"
 
@@ -33,6 +34,9 @@ void PrintJson(const google::protobuf::Message& message);
 
 /// Prints an object with the members to stdout as one line of JSON; see MembersJson.
 void PrintJson(const std::vector<JsonMember>& members);
+
+/// Returns the bytes of a file. Errors: NotFound (FILE_NOT_FOUND).
+absl::StatusOr<std::string> ReadText(const std::string& path);
 
 /// Writes a file. Errors: Internal (OUTPUT_NOT_WRITABLE).
 absl::Status WriteText(const std::string& path, absl::string_view text);
