@@ -15,6 +15,7 @@ class RefusedTest(CommandLineTest):
         for words, reason in ((("stop", "99999"), "SCENE_NOT_FOUND"),
                               (("model", "create", self.folder / "bar.obj", "--young", "3"), "INVALID_MATERIAL"),
                               ((*STRIKE, "--modes-only"), "TRANSFER_NOT_FOUND"),
+                              ((*STRIKE, "--material-file", self.folder), "FILE_NOT_FOUND"),
                               (("model", "list", "--page-size", "3", "--page-token", "x"), "INVALID_SETTINGS"),
                               (("model", "show", "nothing"), "MODAL_MODEL_NOT_FOUND")):
             self.assertEqual(self.daemon.refusal(*words), reason)
