@@ -79,11 +79,11 @@ absl::Status Validate(const ContactImpulse& contact) {
                                 kLongestContactS, " s, or be absent"));
   }
   RETURN_IF_ERROR(Validate(contact.hertz));
-  if (contact.normal && (!Finite(*contact.normal) || *contact.normal == Point{})) {
+  if (!Finite(contact.normal)) {
     return Invalid("CONTACT_MALFORMED",
-                   absl::StrCat("the normal ", Text(*contact.normal),
-                                " is no direction: send finite numbers that are not all zero, or "
-                                "leave it out"));
+                   absl::StrCat("the normal ", Text(contact.normal),
+                                " has a component that is not a finite number: send a direction, "
+                                "or leave it out"));
   }
   if (const auto* point = std::get_if<Point>(&contact.location)) return ValidatePoint(*point);
   return ValidateWeights(std::get<SurfacePoint>(contact.location).weights);

@@ -28,8 +28,8 @@ struct ContactImpulse {
   /// If it is absent, the duration is that of the collision of two elastic bodies.
   std::optional<double> duration_s = std::nullopt;
   HertzContact hertz{};
-  /// Perpendicular to the surfaces that touch, of any length; if it is absent, the impulse is.
-  std::optional<std::array<double, 3>> normal = std::nullopt;
+  /// Perpendicular to the surfaces that touch, of any length; if it is zero, the impulse is.
+  std::array<double, 3> normal{};
 };
 
 /// The fluctuation of a contact's force while the contact travels over a rough surface.

@@ -20,7 +20,8 @@ namespace {
 
 /// After the last force, one knot brings the force down to zero, and another ends the slope.
 constexpr int kKnotsToEnd = 2;
-constexpr double kLongestStep = StepIntervals::kLongestStep;
+/// Longest interval, in stated steps, that is one step: those of some games vary.
+constexpr double kLongestStep = 2.5;
 /// A blow lasts at most this time or, if they last longer, this number of steps.
 constexpr double kLongestBlowS = 0.1;
 constexpr size_t kMostBlowSteps = LoadTracker::kStepCount;
@@ -52,6 +53,8 @@ constexpr double kLostS = 0.01;
 constexpr double kLeastCosine = 0.7, kMostGrowth = 3;
 /// A longer gap than this is no stutter, seconds. Games limit their steps to about 1/3 s.
 constexpr double kLongestStutterS = 0.5;
+/// A client that sends this number of empty steps one after the other leaves none out.
+constexpr int kEmptySteps = 3;
 /// A blow grows by less than kMostGrowth from one step to the next after this number of steps.
 constexpr size_t kLeastBeforeLeap = 2;
 
@@ -83,7 +86,7 @@ BlowGatherer::Events BlowGatherer::Begin(double time_s) {
   const double since_s = time_s - time_s_.value_or(time_s);
   follows_ = time_s_ && since_s <= kLongestStep * nominal_step_s_;
   if (time_s_ && !follows_) {
-    const double missing_count = std::ceil(since_s / nominal_step_s_ - kLongestStep);
+    const double missing_count = std::round(since_s / nominal_step_s_) - 1;
     EndBeforeGap(std::min<double>(missing_count, LoadTracker::kStepCount));
   }
   if (!time_s_) first_time_s_ = time_s;
@@ -160,6 +163,8 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
 
 BlowGatherer::Events BlowGatherer::End() {
   events_.clear();
+  empty_step_count_ = touches_.empty() && follows_ ? empty_step_count_ + 1 : 0;
+  leaves_none_out_ = leaves_none_out_ || empty_step_count_ >= kEmptySteps;
   EndStep();
   return events_;
 }
@@ -168,7 +173,11 @@ void BlowGatherer::EndStep() {
   PairTouches();
   FollowPartners();
   motions_.clear();
-  for (Pair& pair : pairs_) Divide(pair);
+  const bool stutters = Stutters();
+  for (Pair& pair : pairs_) {
+    if (stutters && ContinuesAfterGap(pair)) continue;
+    Divide(pair);
+  }
   std::erase_if(pairs_, [](const Pair& pair) { return pair.load.idle() && !pair.blow.begun(); });
   touches_.clear();
   SendForces();
@@ -343,22 +352,37 @@ bool BlowGatherer::gathers() const {
   return std::ranges::any_of(pairs_, [](const Pair& pair) { return pair.blow.begun(); });
 }
 
-bool BlowGatherer::ContinuesAfterGap(Pair& pair, double impulse) const {
-  if (follows_ || impulse == 0 || gap_s_ > kLongestStutterS) return false;
-  if (pair.blow.begun() || !pair.before_gap.rests()) return false;
+bool BlowGatherer::Stutters() const {
+  if (follows_ || gap_s_ > kLongestStutterS) return false;
+  if (leaves_none_out_) return true;
+  size_t rested_count = 0, rests_count = 0;
+  for (const Pair& pair : pairs_) {
+    if (!pair.before_gap.rests()) continue;
+    ++rested_count;
+    rests_count += pair.touches.empty() ? 0 : 1;
+  }
+  return rests_count >= 2 && rests_count >= rested_count * 3 / 4;
+}
+
+bool BlowGatherer::ContinuesAfterGap(Pair& pair) {
+  if (pair.touches.empty() || pair.blow.begun() || !pair.before_gap.rests()) return false;
+  const double impulse = ImpulseOf(pair);
   LoadTracker load = pair.before_gap;
   if (load.Next(impulse, gap_s_) > 0 || impulse < gap_s_ * load.Usual() / kMostGrowth) return false;
   pair.load = load;
+  counts_.load_count += pair.touches.size();
+  EndTouches(pair, 1 / gap_s_);
   return true;
 }
 
-void BlowGatherer::Divide(Pair& pair) {
+double BlowGatherer::ImpulseOf(const Pair& pair) {
   double impulse = 0;
   for (const PairTouch& touch : pair.touches) impulse += touch.magnitude;
-  if (ContinuesAfterGap(pair, impulse)) {
-    counts_.load_count += pair.touches.size();
-    return EndTouches(pair, 1 / gap_s_);
-  }
+  return impulse;
+}
+
+void BlowGatherer::Divide(Pair& pair) {
+  const double impulse = ImpulseOf(pair);
   const double force = impulse / step_s_;
   const bool elsewhere = pair.load.has_blows() && StrikesElsewhere(pair);
   if (elsewhere) pair.load.ForgetBlows();
@@ -373,9 +397,9 @@ void BlowGatherer::Divide(Pair& pair) {
   double remains = 0;
   Blow& blow = pair.blow;
   if (Flickers(blow, force)) share = IsFeeble(pair) ? 0 : share_of_new_blow;
-  if (blow.begun() && IsOver(blow, force, share * impulse, elsewhere, remains)) {
+  if (blow.begun() && IsOver(blow, force, share * force, elsewhere, remains)) {
     if ((HasLasted(blow) || blow.only_feeble) &&
-        ImpulseAbove(blow, remains) <= Settling(blow) * remains * step_s_) {
+        ImpulseAbove(blow, remains) <= Settling(blow) * remains * MeanStepS(blow)) {
       CountAsLoad(blow);
     } else {
       SendBlow(pair, remains);
@@ -387,7 +411,7 @@ void BlowGatherer::Divide(Pair& pair) {
       blow.feeble = MayFlicker(pair) && IsFeeble(pair);
       blow.lost_steps = 0;
     }
-    Gather(pair, force, share * impulse);
+    Gather(pair, force, share * force);
     if (!follows_ && !(blow.feeble && MayFollow())) SendBlow(pair, 0);
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
@@ -451,7 +475,7 @@ double BlowGatherer::ApproachSpeed(std::span<const PairTouch> touches) const {
   return weights > 0 ? std::max(sum / weights, 0.0) : 0;
 }
 
-void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
+void BlowGatherer::Gather(Pair& pair, double force_newtons, double above_newtons) {
   Blow& blow = pair.blow;
   if (!blow.begun()) {
     const auto lately = [this](const std::optional<double>& time_s) {
@@ -460,14 +484,17 @@ void BlowGatherer::Gather(Pair& pair, double force_newtons, double impulse) {
     blow.lasting =
         lately(pair.touched_s) && (lately(pair.blow_before_last_s) || !StrikesElsewhere(pair));
     pair.blow_before_last_s = std::exchange(pair.last_blow_s, time_s_);
-    blow.greatest = 0;
+    blow.greatest_newtons = 0;
     blow.only_feeble = true;
     blow.places.clear();
   }
-  blow.steps.push_back({.impulse = impulse, .force = force_newtons, .time_s = *time_s_});
-  blow.greatest = std::max(blow.greatest, impulse);
+  blow.steps.push_back({.impulse = above_newtons * step_s_,
+                        .force = force_newtons,
+                        .time_s = *time_s_,
+                        .step_s = step_s_});
+  blow.greatest_newtons = std::max(blow.greatest_newtons, above_newtons);
   blow.only_feeble = blow.only_feeble && IsFeeble(pair);
-  AddToPlaces(blow, pair.touches, impulse / (force_newtons * step_s_));
+  AddToPlaces(blow, pair.touches, above_newtons / force_newtons);
 }
 
 void BlowGatherer::AddToPlaces(Blow& blow, std::span<const PairTouch> touches, double share) const {
@@ -527,17 +554,17 @@ bool BlowGatherer::StrikesElsewhere(const Pair& pair) {
   return known < all / 2;
 }
 
-bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double impulse, bool elsewhere,
-                          double& remains) const {
+bool BlowGatherer::IsOver(const Blow& blow, double force_newtons, double above_newtons,
+                          bool elsewhere, double& remains) const {
   if (blow.lost_steps > 0) return blow.lost_steps > MostLostSteps();
-  if (impulse <= blow.greatest / 4) return !elsewhere;
+  if (above_newtons <= blow.greatest_newtons / 4) return !elsewhere;
   if (HasLasted(blow)) {
     remains = MeanForceOfLastHalf(blow);
     return true;
   }
   remains = 0;
   const auto steps = static_cast<size_t>(std::ceil(kLoadS / step_s_));
-  if (impulse > blow.greatest / 2 || blow.steps.size() < steps + 1) return false;
+  if (above_newtons > blow.greatest_newtons / 2 || blow.steps.size() < steps + 1) return false;
   const auto last = std::span(blow.steps).last(steps);
   for (const Blow::Step& step : last) remains += step.force / static_cast<double>(steps);
   return force_newtons >= 0.75 * last.front().force;
@@ -564,10 +591,16 @@ double BlowGatherer::Settling(const Blow& blow) {
                   kDeviations * deviation * std::sqrt(static_cast<double>(blow.steps.size())));
 }
 
-double BlowGatherer::ImpulseAbove(const Blow& blow, double load_newtons) const {
-  const double excess = std::max(load_newtons - blow.load_newtons, 0.0) * step_s_;
+double BlowGatherer::MeanStepS(const Blow& blow) {
+  double sum_s = 0;
+  for (const Blow::Step& step : blow.steps) sum_s += step.step_s;
+  return sum_s / static_cast<double>(blow.steps.size());
+}
+
+double BlowGatherer::ImpulseAbove(const Blow& blow, double load_newtons) {
+  const double excess = std::max(load_newtons - blow.load_newtons, 0.0);
   double impulse = 0;
-  for (const Blow::Step& step : blow.steps) impulse += step.impulse - excess;
+  for (const Blow::Step& step : blow.steps) impulse += step.impulse - excess * step.step_s;
   return impulse;
 }
 

@@ -67,8 +67,10 @@ struct ForceEvent {
 ///
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.
-/// A game that stutters takes one long step instead. Therefore, if a pair rested before a gap of up
-/// to half a second, an impulse that fits its load for the length of the gap is still its load.
+/// A game that stutters takes one long step instead. If a pair rested before a gap of up to half a
+/// second, an impulse that fits its load for the length of the gap is therefore still its load. The
+/// impulse of a body that was thrown up and lands would fit, too. Hence the client must have sent
+/// empty steps before, so that it leaves none out, or several pairs must have rested and touch.
 ///
 /// An impulse that changes the speed of its bodies by hardly more than gravity does in a step may
 /// be the load of a body that rests when the simulation begins, or whose contact flickers. In the
@@ -213,9 +215,10 @@ class BlowGatherer {
       double impulse = 0;  // above the load, N s
       double force = 0;    // the whole force, newtons
       double time_s = 0;
+      double step_s = 0;  // length of the step
     };
-    double load_newtons = 0;  // load before the blow
-    double greatest = 0;      // impulse of its strongest step, N s
+    double load_newtons = 0;      // load before the blow
+    double greatest_newtons = 0;  // the greatest force above the load
     std::vector<Step> steps{};
     std::vector<Place> places{};  // in the order in which they began
     bool lasting = false;         // whether the bodies touched here shortly before the blow
@@ -280,8 +283,11 @@ class BlowGatherer {
   void Add(const Part& part, double per_second, const Roughness& roughness);
   /// Sends the forces of this step, and each object's knot.
   void SendForces();
-  /// Returns whether a pair that touches after a gap rested all the time, and lets its load go on.
-  bool ContinuesAfterGap(Pair& pair, double impulse) const;
+  /// Returns whether this step, which follows no other, is a long one of a game that stutters.
+  bool Stutters() const;
+  /// Returns whether a pair rested in the long step of a stutter. If so, its load goes on.
+  bool ContinuesAfterGap(Pair& pair);
+  static double ImpulseOf(const Pair& pair);
   /// Sends the blows of two bodies as impulses, and their loads (see LoadTracker) as forces.
   void Divide(Pair& pair);
   /// Adds a step's force to the time for which a feeble blow has lost its contact. Returns whether
@@ -297,14 +303,15 @@ class BlowGatherer {
   /// Returns the mean of the speeds at which the places of the touches approach, weighted by their
   /// impulses, or zero if it is not known.
   double ApproachSpeed(std::span<const PairTouch> touches) const;
-  /// Adds a step's force and the impulse above the load to the pair's blow, which begins with its
-  /// first step.
-  void Gather(Pair& pair, double force_newtons, double impulse);
+  /// Adds a step's force, of which `above_newtons` are above the load, to the pair's blow, which
+  /// begins with its first step.
+  void Gather(Pair& pair, double force_newtons, double above_newtons);
   /// Adds a step's touches to the places of a blow, each with this share of its impulse.
   void AddToPlaces(Blow& blow, std::span<const PairTouch> touches, double share) const;
-  /// Returns whether the blow is over in this step, which has the given force and impulse above the
-  /// load and may strike `elsewhere`. If a load remains, `remains` is set to its force.
-  bool IsOver(const Blow& blow, double force_newtons, double impulse, bool elsewhere,
+  /// Returns whether the blow is over in this step, which has the given force, of which
+  /// `above_newtons` are above the load, and may strike `elsewhere`. If a load remains, `remains`
+  /// is set to its force.
+  bool IsOver(const Blow& blow, double force_newtons, double above_newtons, bool elsewhere,
               double& remains) const;
   /// Returns whether a blow has lasted as long as one may: what touches then is a load.
   bool HasLasted(const Blow& blow) const;
@@ -312,7 +319,8 @@ class BlowGatherer {
   /// Returns by how many steps of the load that remains its noise may exceed it in all.
   static double Settling(const Blow& blow);
   /// Returns the impulse of a blow above this load, N s.
-  double ImpulseAbove(const Blow& blow, double load_newtons) const;
+  static double ImpulseAbove(const Blow& blow, double load_newtons);
+  static double MeanStepS(const Blow& blow);
   /// Sends a pair's blow, and ends it.
   void SendBlow(Pair& pair, double remains_newtons);
   /// Sends an impact, `later_s` after the first one of its blow.
@@ -340,6 +348,8 @@ class BlowGatherer {
   std::vector<Motion> motions_;  // ascending; of this step, if it was asked for
   double gap_s_ = 0;             // time since the previous step that was sent
   double first_time_s_ = 0;
+  int empty_step_count_ = 0;      // newest steps without contacts, none of them missing
+  bool leaves_none_out_ = false;  // whether the client has sent empty steps
   BlowCounts counts_;
 };
 

@@ -121,8 +121,10 @@ double Magnitude(const Vector3& vector) { return std::hypot(vector[0], vector[1]
 Vector3 PressingPart(const ContactImpulse& contact) {
   constexpr double kLeastAlong = 0.1;  // no friction is ten times the load
   const Vector3& impulse = contact.impulse_newton_seconds;
-  if (!contact.normal) return impulse;
-  Vector3 part = *contact.normal;
+  Vector3 part = contact.normal;
+  const double largest = std::max({std::abs(part[0]), std::abs(part[1]), std::abs(part[2])});
+  if (largest == 0) return impulse;
+  for (double& component : part) component /= largest;
   const double along = Dot(impulse, part), squared = Dot(part, part);
   if (along * along < kLeastAlong * kLeastAlong * squared * Dot(impulse, impulse)) return impulse;
   for (double& component : part) component *= along / squared;

@@ -28,7 +28,7 @@ ObjectContact FromSceneFrame(ObjectContact contact, const SoundingObject& object
   const Pose pose = PoseOf(object);
   MoveInwards(contact.impulse.location, pose);
   contact.impulse.impulse_newton_seconds = Inwards(contact.impulse.impulse_newton_seconds, pose);
-  if (contact.impulse.normal) contact.impulse.normal = Inwards(*contact.impulse.normal, pose);
+  contact.impulse.normal = Inwards(contact.impulse.normal, pose);
   if (second == nullptr) return contact;
   MoveInwards(contact.second->location, PoseOf(*second));
   contact.second->rotation = std::nullopt;  // follows from the poses

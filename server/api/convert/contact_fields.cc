@@ -73,7 +73,7 @@ absl::Status ReadFields(const v1::Contact& row, Target& target) {
   ASSIGN_OR_RETURN(contact.impulse.impulse_newton_seconds, VectorOf(row));
   if constexpr (requires { target.time_offset_s; }) {
     RETURN_IF_ERROR(ReadDuration(row, contact.impulse));
-    if (row.has_normal()) contact.impulse.normal = ToArray(row.normal());
+    contact.impulse.normal = ToArray(row.normal());
     target.time_offset_s = row.time_offset_s();
   }
   if constexpr (requires { target.partner; }) target.partner = row.partner();
@@ -119,12 +119,6 @@ std::optional<double> ToDuration(const v1::ContactColumns& columns, int row) {
   return columns.duration_s(row);
 }
 
-std::optional<Vector3> ToNormal(const v1::ContactColumns& columns, int row) {
-  if (columns.normal().empty()) return std::nullopt;
-  const Vector3 normal = ToArray(columns.normal(), row);
-  return normal == Vector3{} ? std::nullopt : std::optional(normal);
-}
-
 /// Returns a row's number, or zero if the column is empty.
 template <typename Number>
 Number ToNumber(const Numbers<Number>& column, int row) {
@@ -143,7 +137,7 @@ void ReadFields(const v1::ContactColumns& columns, int row, Target& target) {
   contact.second = ToSecond(columns, row);
   if constexpr (requires { target.time_offset_s; }) {
     contact.impulse.duration_s = ToDuration(columns, row);
-    contact.impulse.normal = ToNormal(columns, row);
+    if (!columns.normal().empty()) contact.impulse.normal = ToArray(columns.normal(), row);
     target.time_offset_s = ToNumber(columns.time_offset_s(), row);
   }
   if constexpr (requires { target.partner; }) target.partner = ToNumber(columns.partner(), row);

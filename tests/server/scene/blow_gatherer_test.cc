@@ -166,19 +166,20 @@ TEST_F(BlowGathererTest, AfterAGapASmallerContactIsABlowAsIfTheStepsHadBeenSentE
 constexpr double kWeight = 9.81 * kStepS;
 
 /// The blows of a body of 1 kg that rests for `rests_s` and, after a gap, for 40 steps more, N s.
-/// The first step after the gap has the impulse that the body gets in `weighs_s`.
-std::vector<float> Stutter(double rate_hz, double gap_s, double weighs_s, double rests_s = 0.3) {
+/// The first step after the gap has the impulse that the body gets in `weighs_s`. Before, there may
+/// be steps without contacts.
+std::vector<float> Stutter(double rate_hz, double gap_s, double weighs_s, int empty_count = 5) {
   BlowGatherer gatherer(1 / rate_hz);
   std::vector<float> blows;
   double time_s = 0;
-  const int last = static_cast<int>(0.4 * rate_hz);
+  const int last = static_cast<int>(0.3 * rate_hz) + empty_count;
   for (int step = 0; step < last + 40; ++step) {
     time_s += step == last ? gap_s : 1 / rate_hz;
     for (const ForceEvent& event : gatherer.Begin(time_s)) {
       if (ImpulseOf(event)) blows.push_back(*ImpulseOf(event));
     }
     const double impulse = 9.81 * (step == last ? weighs_s : 1 / rate_hz);
-    if (step >= last - rests_s * rate_hz) TouchBy(gatherer, impulse);
+    if (step >= empty_count) TouchBy(gatherer, impulse);
     for (const ForceEvent& event : gatherer.End()) {
       if (ImpulseOf(event)) blows.push_back(*ImpulseOf(event));
     }
@@ -193,27 +194,44 @@ TEST(BlowGatherer, ABodyAtRestDoesNotStrikeWhenAGameStutters) {
       // What exceeds the load by far is a blow all the same.
       const std::vector<float> struck = Stutter(rate_hz, gap_s, 10 * gap_s);
       ASSERT_EQ(struck.size(), 1U) << rate_hz << " Hz, " << gap_s << " s";
-      EXPECT_NEAR(struck[0], 98.1 * gap_s, 0.2 * 98.1 * gap_s);
+      EXPECT_GT(struck[0], 0.65 * 98.1 * gap_s);  // Up to three times the load may be a load.
     }
-    // A body that only just touched had no load before the gap.
-    const std::vector<float> landed = Stutter(rate_hz, 0.3, 0.3, 0);
-    EXPECT_GT(std::reduce(landed.begin(), landed.end()), 0.9F * 9.81F * 0.3F) << rate_hz << " Hz";
+    // A body that is thrown up lands as hard. Its client may leave out the steps of the flight.
+    const std::vector<float> thrown = Stutter(rate_hz, 0.3, 0.24, 0);
+    ASSERT_EQ(thrown.size(), 1U) << rate_hz << " Hz";
+    EXPECT_NEAR(thrown[0], 9.81 * 0.24, 1e-5) << rate_hz << " Hz";
+  }
+}
+
+TEST(BlowGatherer, OfSeveralBodiesAtRestNoneStrikesWhenAGameStutters) {
+  BlowGatherer gatherer(1.0 / 60);
+  for (int step = 0; step < 60; ++step) {
+    const int steps = step < 40 ? 1 : 18;
+    for (const ForceEvent& event : gatherer.Begin((step + (step < 40 ? 0 : 17)) / 60.0)) {
+      EXPECT_FALSE(ImpulseOf(event));
+    }
+    for (const uint32_t body : {3U, 4U, 5U}) {
+      TouchBy(gatherer, 9.81 * (step == 40 ? steps : 1) / 60, 9, body);
+    }
+    for (const ForceEvent& event : gatherer.End()) EXPECT_FALSE(ImpulseOf(event));
   }
 }
 
 TEST(BlowGatherer, ABodyAtRestDoesNotStrikeInStepsOfAnyLength) {
   std::mt19937 random(1);
-  std::uniform_real_distribution<double> length_s(1.0 / 120, 1.0 / 15);
-  BlowGatherer gatherer(1.0 / 60);
-  double time_s = 0, struck = 0;
-  for (int step = 0; step < 600; ++step) {
-    const double step_s = step < 20 ? 1.0 / 60 : length_s(random);
-    time_s += step_s;
-    for (const ForceEvent& event : gatherer.Begin(time_s)) struck += ImpulseOf(event).value_or(0);
-    TouchBy(gatherer, 9.81 * step_s);
-    for (const ForceEvent& event : gatherer.End()) struck += ImpulseOf(event).value_or(0);
+  std::uniform_real_distribution<double> length_s(1.0 / 200, 1.0 / 30);
+  for (int run = 0; run < 40; ++run) {
+    BlowGatherer gatherer(1.0 / 60);
+    double time_s = 0, struck = 0;
+    for (int step = 0; step < 200; ++step) {
+      const double step_s = length_s(random);
+      time_s += step_s;
+      for (const ForceEvent& event : gatherer.Begin(time_s)) struck += ImpulseOf(event).value_or(0);
+      TouchBy(gatherer, 9.81 * step_s);
+      for (const ForceEvent& event : gatherer.End()) struck += ImpulseOf(event).value_or(0);
+    }
+    EXPECT_EQ(struck, 0) << run;
   }
-  EXPECT_EQ(struck, 0);
 }
 
 TEST(BlowGatherer, WhatRestsWhenTheSimulationBeginsDoesNotStrike) {

@@ -213,7 +213,7 @@ TEST(ColumnConversion, ReportedContactsHaveTheColumnsOfImpactsAndTheirOwn) {
   EXPECT_EQ(touch.roughness.depth, 0.4);
   EXPECT_EQ(touch.roughness.irregularity_length_m, 0.001);
   ReadRow(columns, 1, touch);
-  EXPECT_FALSE(touch.contact.impulse.normal.has_value());
+  EXPECT_EQ(touch.contact.impulse.normal, Vector3{});
   columns.mutable_partner()->RemoveLast();
   EXPECT_THAT(Validate(columns).ToString(), HasSubstr("CONTACT_MALFORMED: the column partner"));
 }
