@@ -29,6 +29,8 @@ double LoadTracker::Next(double impulse_newton_seconds, double step_s) {
   return force > 0 ? blow / force : 0;
 }
 
+void LoadTracker::Forget() { forces_newtons_ = blows_newtons_ = {}; }
+
 void LoadTracker::ForgetBlows() {
   for (size_t i = 0; i < kStepCount; ++i) forces_newtons_[i] -= blows_newtons_[i];
   blows_newtons_ = {};

@@ -31,6 +31,9 @@ class LoadTracker {
   /// Returns whether a remembered step had a blow.
   bool has_blows() const;
 
+  /// Counts the remembered steps for nothing, as those of a body that bore no load.
+  void Forget();
+
   /// Counts the blows of the remembered steps for nothing, as after a flight.
   void ForgetBlows();
 

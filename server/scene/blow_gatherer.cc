@@ -384,6 +384,11 @@ double BlowGatherer::ImpulseOf(const Pair& pair) {
 void BlowGatherer::Divide(Pair& pair) {
   const double impulse = ImpulseOf(pair);
   const double force = impulse / step_s_;
+  // What comes from flight and leaves again, perhaps after a last step of a soft contact, bore no
+  // load.
+  if (force == 0 && pair.flew_until_s && *time_s_ <= *pair.flew_until_s + kLongestStep * step_s_) {
+    pair.load.Forget();
+  }
   const bool elsewhere = pair.load.has_blows() && StrikesElsewhere(pair);
   if (elsewhere) pair.load.ForgetBlows();
   // The part of the impulse that exceeds the load, 0 to 1.
@@ -403,6 +408,7 @@ void BlowGatherer::Divide(Pair& pair) {
       CountAsLoad(blow);
     } else {
       SendBlow(pair, remains);
+      pair.flew_until_s = blow.load_newtons == 0 && remains == 0 ? time_s_ : std::nullopt;
     }
     share = 0;
   } else if (share > 0) {
@@ -494,6 +500,7 @@ void BlowGatherer::Gather(Pair& pair, double force_newtons, double above_newtons
                         .step_s = step_s_});
   blow.greatest_newtons = std::max(blow.greatest_newtons, above_newtons);
   blow.only_feeble = blow.only_feeble && IsFeeble(pair);
+  blow.feeble = blow.feeble && blow.only_feeble;
   AddToPlaces(blow, pair.touches, above_newtons / force_newtons);
 }
 

@@ -255,6 +255,8 @@ class BlowGatherer {
     std::optional<double> touched_s = std::nullopt;  // the time of the last touch before this step
     std::array<Motion, 2> given{};                   // what it gave its objects in the last touch
     LoadTracker before_gap{};                        // the load when the steps ceased
+    // The end of its last blow, if it had no load before and none remained.
+    std::optional<double> flew_until_s = std::nullopt;
     // The times at which the last two blows began.
     std::optional<double> last_blow_s = std::nullopt, blow_before_last_s = std::nullopt;
     Blow blow{};

@@ -584,6 +584,38 @@ TEST(BlowGatherer, CornersThatLandInDifferentStepsStrikeOneByOne) {
   }
 }
 
+/// The integral of a soft blow of 8 ms up to a time since it began, over its impulse.
+double PartOfHalfSine(double time_s) {
+  constexpr double kLastsS = 0.008;
+  return (1 - std::cos(std::numbers::pi * std::clamp(time_s / kLastsS, 0.0, 1.0))) / 2;
+}
+
+TEST(BlowGatherer, ARockingBodyStrikesWithTheWholeImpulseOfEachSoftContact) {
+  const std::vector<double> newton_seconds{0.6, 0.7, 0.3};
+  for (const double rate_hz : {240.0, 480.0, 1000.0}) {
+    for (const double rocks_s : {0.02, 0.03}) {
+      const std::vector<ForceEvent> blows = BlowsOf(
+          static_cast<int>(0.4 * rate_hz),
+          [&](auto& gatherer, int step) {
+            for (size_t blow = 0; blow < newton_seconds.size(); ++blow) {
+              const double time_s = step / rate_hz - 0.1 - static_cast<double>(blow) * rocks_s;
+              const double part = PartOfHalfSine(time_s) - PartOfHalfSine(time_s - 1 / rate_hz);
+              if (part < 1e-9) continue;
+              gatherer.Touch({.contact = {.handle = 3}},
+                             At(blow == 1 ? 0.4 : 0, part * newton_seconds[blow]));
+            }
+          },
+          1 / rate_hz);
+      SCOPED_TRACE(testing::Message() << rate_hz << " Hz, " << rocks_s << " s");
+      ASSERT_EQ(blows.size(), 3U);
+      for (size_t blow = 0; blow < blows.size(); ++blow) {
+        EXPECT_EQ(VertexOf(blows[blow]), blow == 1 ? 40U : 0U);
+        EXPECT_NEAR(*ImpulseOf(blows[blow]) / newton_seconds[blow], 1, 0.2);
+      }
+    }
+  }
+}
+
 TEST(BlowGatherer, OfCornersWhoseSoftContactsOverlapEachGetsItsOwnImpulse) {
   const std::vector<double> half_sine{0.2, 0.5, 0.6, 0.5, 0.2};
   const std::vector<ForceEvent> blows = BlowsOf(
