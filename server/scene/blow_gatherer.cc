@@ -20,8 +20,7 @@ namespace {
 
 /// After the last force, one knot brings the force down to zero, and another ends the slope.
 constexpr int kKnotsToEnd = 2;
-/// Longest interval, in stated steps, that is one step: those of some games vary.
-constexpr double kLongestStep = 2.5;
+constexpr double kLongestStep = StepIntervals::kLongestStep;
 /// A blow lasts at most this time or, if they last longer, this number of steps.
 constexpr double kLongestBlowS = 0.1;
 constexpr size_t kMostBlowSteps = LoadTracker::kStepCount;
@@ -384,11 +383,6 @@ double BlowGatherer::ImpulseOf(const Pair& pair) {
 void BlowGatherer::Divide(Pair& pair) {
   const double impulse = ImpulseOf(pair);
   const double force = impulse / step_s_;
-  // What comes from flight and leaves again, perhaps after a last step of a soft contact, bore no
-  // load.
-  if (force == 0 && pair.flew_until_s && *time_s_ <= *pair.flew_until_s + kLongestStep * step_s_) {
-    pair.load.Forget();
-  }
   const bool elsewhere = pair.load.has_blows() && StrikesElsewhere(pair);
   if (elsewhere) pair.load.ForgetBlows();
   // The part of the impulse that exceeds the load, 0 to 1.
@@ -419,6 +413,11 @@ void BlowGatherer::Divide(Pair& pair) {
     }
     Gather(pair, force, share * force);
     if (!follows_ && !(blow.feeble && MayFollow())) SendBlow(pair, 0);
+  }
+  // What comes from flight and leaves again, perhaps after a last step of a soft contact, bore no
+  // load.
+  if (force == 0 && pair.flew_until_s && *time_s_ <= *pair.flew_until_s + kLongestStep * step_s_) {
+    pair.load.Forget();
   }
   counts_.load_count += share > 0 ? 0 : pair.touches.size();
   if (undecided) share = 0;

@@ -63,7 +63,8 @@ struct ForceEvent {
 /// the frame of either body. Each place gets the impulse of its own contacts. Places whose
 /// impulses are greatest in one step strike together, and those of a later step as much later. A
 /// strong impulse at a place that the last blow did not touch is no part of that blow's end, and
-/// the force of that blow does not count as its load.
+/// the force of that blow does not count as its load. Nor does it count for the next blow at the
+/// same place if the bodies met without a load and parted again.
 ///
 /// A client may send only the steps with contacts. Steps that are missing count as steps without
 /// contact, and the first step after a gap is a blow by itself, which need not wait for more steps.

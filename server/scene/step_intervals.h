@@ -13,9 +13,8 @@ namespace carillon {
 /// that a body at rest strikes in each step.
 class StepIntervals {
  public:
-  /// Longest interval, in stated steps, that does not count as a gap. An engine's steps have nearly
-  /// the same length.
-  static constexpr double kLongestStep = 1.5;
+  /// Longest interval, in stated steps, that is one step and no gap: the steps of some games vary.
+  static constexpr double kLongestStep = 2.5;
 
   explicit StepIntervals(double stated_step_s) : stated_step_s_(stated_step_s) {}
 

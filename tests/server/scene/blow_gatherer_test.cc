@@ -560,6 +560,24 @@ uint32_t VertexOf(const ForceEvent& blow) {
   return std::get<SurfaceImpulse>(blow.action).at.vertices[1];
 }
 
+TEST(BlowGatherer, ASecondBlowAtAPlaceSoundsInFullOnceTheBodiesHaveParted) {
+  for (const double rate_hz : {60.0, 240.0, 1000.0}) {
+    for (const int apart : {2, 3, 5}) {
+      const std::vector<ForceEvent> blows = BlowsOf(
+          60,
+          [&](auto& gatherer, int step) {
+            if (step == 40) gatherer.Touch({.contact = {.handle = 3}}, At(0, 10));
+            if (step == 40 + apart) gatherer.Touch({.contact = {.handle = 3}}, At(0, 6));
+          },
+          1 / rate_hz);
+      SCOPED_TRACE(testing::Message() << rate_hz << " Hz, " << apart);
+      ASSERT_EQ(blows.size(), 2U);
+      EXPECT_NEAR(*ImpulseOf(blows[0]), 10, 1e-5);
+      EXPECT_NEAR(*ImpulseOf(blows[1]), 6, 1e-5);
+    }
+  }
+}
+
 TEST(BlowGatherer, CornersThatLandInDifferentStepsStrikeOneByOne) {
   for (const double rate_hz : {60.0, 240.0, 1000.0, 2400.0}) {
     for (const double second : {2.0, 7.0, 14.0}) {
