@@ -173,6 +173,7 @@ def part_of_scene(gallery, name, seconds, words):
                                  build=gallery.options.build)
     trace = gallery.folder / f"{name}.contacts"
     scene = run.record_example(gallery.client, options, gallery.folder, trace)
+    gallery.await_transfers(trace)
     samples = fitted(run.render(gallery.client, trace).normalized(0.7).samples, seconds)
     poses = video.poses_of("bullet", scene, rate=1000, seconds=None, build=gallery.options.build)
     count = int(seconds * video.FRAMES_PER_S)

@@ -122,7 +122,14 @@ class Gallery:
                                      build=self.options.build)
         trace = self.folder / f"{example}.contacts"
         run.record_example(self.client, options, self.folder, trace)
+        self.await_transfers(trace)
         return run.render(self.client, trace)
+
+    def await_transfers(self, trace):
+        """Without them the bodies of a trace would sound by the paper's coupling."""
+        import carillon
+        for name in {body.modal_model for body in carillon.Trace.read(trace).objects}:
+            self.client.model(name).wait_for_transfer()
 
     def modes(self):
         """Four modes of the bell, bent by an eighth of its size."""
