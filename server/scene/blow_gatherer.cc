@@ -162,8 +162,9 @@ void BlowGatherer::Touch(const ObjectTouch& touch, const BodyImpulses& impulse) 
 
 BlowGatherer::Events BlowGatherer::End() {
   events_.clear();
-  empty_step_count_ = touches_.empty() && follows_ ? empty_step_count_ + 1 : 0;
-  leaves_none_out_ = leaves_none_out_ || empty_step_count_ >= kEmptySteps;
+  if (empty_step_count_ < kEmptySteps) {
+    empty_step_count_ = touches_.empty() && follows_ ? empty_step_count_ + 1 : 0;
+  }
   EndStep();
   return events_;
 }
@@ -353,7 +354,7 @@ bool BlowGatherer::gathers() const {
 
 bool BlowGatherer::Stutters() const {
   if (follows_ || gap_s_ > kLongestStutterS) return false;
-  if (leaves_none_out_) return true;
+  if (empty_step_count_ == kEmptySteps) return true;
   size_t rested_count = 0, rests_count = 0;
   for (const Pair& pair : pairs_) {
     if (!pair.before_gap.rests()) continue;
@@ -414,8 +415,8 @@ void BlowGatherer::Divide(Pair& pair) {
     Gather(pair, force, share * force);
     if (!follows_ && !(blow.feeble && MayFollow())) SendBlow(pair, 0);
   }
-  // What comes from flight and leaves again, perhaps after a last step of a soft contact, bore no
-  // load.
+  // Bodies that met in flight and part again bore no load. A soft contact may push for one more
+  // step after its blow is over.
   if (force == 0 && pair.flew_until_s && *time_s_ <= *pair.flew_until_s + kLongestStep * step_s_) {
     pair.load.Forget();
   }

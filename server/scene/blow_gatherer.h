@@ -172,7 +172,7 @@ class BlowGatherer {
     std::array<Part, 2> parts{};
     size_t part_count = 0;
     double magnitude = 0;  // of the first object's impulse, N s
-    double pressing = 0;   // of its part along the normal, N s
+    double pressing = 0;   // magnitude of the impulse's part along the normal, N s
     double reach_m = 0;    // how far apart contacts at one place may be
     Roughness roughness;
     double time_offset_s = 0;
@@ -351,8 +351,9 @@ class BlowGatherer {
   std::vector<Motion> motions_;  // ascending; of this step, if it was asked for
   double gap_s_ = 0;             // time since the previous step that was sent
   double first_time_s_ = 0;
-  int empty_step_count_ = 0;      // newest steps without contacts, none of them missing
-  bool leaves_none_out_ = false;  // whether the client has sent empty steps
+  // Number of the newest steps that were sent without contacts, with no step missing between them.
+  // It stays at kEmptySteps, because such a client leaves out no step.
+  int empty_step_count_ = 0;
   BlowCounts counts_;
 };
 

@@ -29,7 +29,8 @@ struct BodyImpulse {
   /// along the contact's normal, or all of it if nobody told the normal.
   Vector3 pressing{};
   /// The angular impulse of that part about the centre of mass, times a root of the inverse tensor
-  /// of inertia. Half its square is the energy of the turn that it gives the object at rest, J.
+  /// of inertia. Half the square of this vector is the energy, J, of the rotation that the impulse
+  /// gives an object at rest.
   Vector3 turn{};
   /// The impulse that gives the whole object ten times the speed of sound in its material. No body
   /// withstands even a tenth of this impulse.

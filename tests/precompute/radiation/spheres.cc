@@ -54,7 +54,7 @@ std::vector<double> RealHarmonics(int order, const Point& direction) {
   for (int l = 0; l <= order; ++l) {
     for (int m = -l; m <= l; ++m) {
       const auto degree = static_cast<unsigned>(std::abs(m));
-      const double phase = m % 2 == 0 ? 1 : -1;  // of Condon and Shortley
+      const double phase = m % 2 == 0 ? 1 : -1;  // the phase of Condon and Shortley
       const double turned = m < 0 ? std::sin(-m * phi) : std::cos(m * phi);
       harmonics.push_back((m == 0 ? 1 : std::numbers::sqrt2) * phase * turned *
                           std::sph_legendre(static_cast<unsigned>(l), degree, theta));
