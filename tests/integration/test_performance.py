@@ -146,12 +146,13 @@ class PerformanceTest(DaemonTest):
 
     def test_contacts_for_which_a_step_has_no_place_are_rejected_at_once(self):
         sound = self.begin()
+        most = 8 * 64
 
         def heard(count):
             sound.reset()
             impacts = carillon.Impacts(1, [POINT] * count, [numpy.multiply(IMPULSE, 1e-3)] * count,
                                        durations=DURATION_S)
-            if count <= 512:
+            if count <= most:
                 sound.step(impacts=impacts)
             else:
                 with self.assertRaises(carillon.CarillonError) as refused:
@@ -159,9 +160,16 @@ class PerformanceTest(DaemonTest):
                 self.assertEqual(refused.exception.reason, "TOO_MANY_CONTACTS")
             return sound.step()[0]
 
-        full = heard(512)
+        full = heard(most)
         numpy.testing.assert_array_equal(heard(600), full)
-        numpy.testing.assert_allclose(full, 512 * heard(1), rtol=0, atol=0.01 * abs(full).max())
+        numpy.testing.assert_allclose(full, most * heard(1), rtol=0, atol=0.01 * abs(full).max())
+
+    def test_many_objects_and_their_contacts_have_places_if_they_are_there_from_the_first_step_on(self):
+        with self.c.perform(step=STEP_S, microphones=[carillon.Omni(at=ABOVE)], tell_impacts=True) as sound:
+            many = numpy.repeat([sound.add(self.model) for _ in range(200)], 4)
+            impacts = carillon.Impacts(many, [POINT] * 800, [numpy.multiply(IMPULSE, 1e-3)] * 800,
+                                       durations=DURATION_S)
+            self.assertEqual(len(sound.step(impacts=impacts)[1]), 800)
 
     def test_effects_leave_the_distance_from_which_on_the_level_falls(self):
         sound = self.begin(hearing={"distance_gain": True, "directivity": False},

@@ -10,7 +10,6 @@
 #include "server/api/convert/contact_conversion.h"
 #include "server/api/convert/contact_fields.h"
 #include "server/api/convert/hertz_contact_conversion.h"
-#include "server/scene/offline/environment.h"
 
 namespace carillon {
 namespace {
@@ -148,14 +147,18 @@ void RowsByEnvironment::Reject(const absl::Status& why, StepRejections& rejectio
   std::ranges::fill(first_, 0);
 }
 
-PerformRows::PerformRows(const v1::PerformStep& step, size_t environment_count,
-                         size_t microphone_count, StepRejections& rejections)
+PerformRows::PerformRows(const v1::PerformStep& step, const Performance& performance,
+                         StepRejections& rejections)
     : step_(step),
+      most_events_(performance.settings().most_events()),
       rejections_(rejections),
       poses_(SpanOf(step.poses().environment()), step.poses().columns().object_size(),
-             environment_count, rejections),
+             performance.environment_count(), rejections),
       microphones_(SpanOf(step.microphone_poses().environment()),
-                   step.microphone_poses().microphone_size(), environment_count, rejections) {
+                   step.microphone_poses().microphone_size(), performance.environment_count(),
+                   rejections) {
+  const size_t environment_count = performance.environment_count();
+  const size_t microphone_count = performance.settings().microphones.size();
   const absl::Status poses = carillon::Validate(step.poses().columns());
   if (!poses.ok()) poses_.Reject(poses, rejections);
   const absl::Status microphones = Validate(step.microphone_poses());
@@ -196,7 +199,7 @@ void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& int
     const v1::MicrophonePoses& poses = step_.microphone_poses();
     if (poses.microphone(row) == microphone) intake.MoveListener(ReadPose(poses, row));
   }
-  size_t room = Environment::kMostEvents;
+  size_t room = most_events_;
   for (const Contacts& contacts : contacts_) {
     const std::span<const int> rows = contacts.rows.of(environment);
     const size_t events_per_row = contacts.columns->second_object().empty() ? 1 : 2;
@@ -206,7 +209,7 @@ void PerformRows::Read(size_t environment, size_t microphone, ContactIntake& int
     if (taken_count == rows.size()) continue;
     intake.Reject(rows.size() - taken_count,
                   Refusal(absl::StatusCode::kResourceExhausted, "TOO_MANY_CONTACTS",
-                          absl::StrCat("an environment takes ", Environment::kMostEvents,
+                          absl::StrCat("an environment takes ", most_events_,
                                        " contacts in a step, of which those with a second object "
                                        "count twice; report fewer points")));
   }

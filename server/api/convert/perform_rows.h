@@ -13,6 +13,7 @@
 #include "carillon/v1/performance.pb.h"
 #include "server/excitation/contact.h"
 #include "server/scene/contact_intake.h"
+#include "server/scene/offline/performance.h"
 
 namespace carillon {
 
@@ -81,7 +82,7 @@ class PerformRows {
  public:
   /// Rejects what cannot be read (CONTACT_MALFORMED, PERFORMANCE_MALFORMED, UNKNOWN_STRIKER), of a
   /// list with a wrong column or striker all rows. `step` and `rejections` must outlive the rows.
-  PerformRows(const v1::PerformStep& step, size_t environment_count, size_t microphone_count,
+  PerformRows(const v1::PerformStep& step, const Performance& performance,
               StepRejections& rejections);
 
   /// Gives the poses and contacts of an environment to the intake of a microphone, and to that of
@@ -97,6 +98,7 @@ class PerformRows {
   };
 
   const v1::PerformStep& step_;
+  const size_t most_events_;  // of an environment
   const StepRejections& rejections_;
   RowsByEnvironment poses_;
   RowsByEnvironment microphones_;

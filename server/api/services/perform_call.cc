@@ -29,7 +29,7 @@ namespace {
 
 /// A message stays below the 4 MiB that gRPC's clients take if they say nothing else.
 constexpr size_t kMostSampleBytes = size_t{2} << 20U;
-/// Objects for which each environment has room, beside those of the settings.
+/// Objects for which each environment has room, beside twice those of the settings or first step.
 constexpr size_t kMoreObjects = 64;
 /// The trailing metadata that has the warnings, as a RenderSummary.
 constexpr char kSummaryKey[] = "carillon-summary-bin";
@@ -65,23 +65,28 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
 
   absl::Status Begin(const v1::PerformSettings& message) {
     if (performance_ != nullptr) return Malformed("settings were sent twice; they come once");
-    ASSIGN_OR_RETURN(EnvironmentSettings settings, ToEnvironmentSettings(message, daemon_.heads));
-    const size_t count = std::max<size_t>(message.environment_count(), 1);
-    settings.most_objects = 2 * static_cast<size_t>(message.objects_size()) + kMoreObjects;
-    RETURN_IF_ERROR(Performance::Validate(settings, count));
-    environment_bytes_ = Performance::EnvironmentBytes(settings) * count;
-    RETURN_IF_ERROR(GrowMemory());
-    ASSIGN_OR_RETURN(
-        performance_,
-        Performance::Make(settings, count, std::max(std::thread::hardware_concurrency(), 1U),
-                          daemon_.bodies, &daemon_.database.transfers()));
+    ASSIGN_OR_RETURN(settings_, ToEnvironmentSettings(message, daemon_.heads));
+    environment_count_ = std::max<size_t>(message.environment_count(), 1);
+    first_objects_ = message.objects();
+    RETURN_IF_ERROR(Performance::Validate(settings_, environment_count_));
     begins_ = true;
-    sample_rate_hz_ = settings.sample_rate_hz;
-    microphone_count_ = settings.microphones.size();
-    tells_impacts_ = settings.tells_impacts;
-    told_counts_.resize(count);
-    for (const v1::PerformedObject& object : message.objects()) RETURN_IF_ERROR(Add(object));
+    told_counts_.resize(environment_count_);
+    RETURN_IF_ERROR(Make(0));
     return rejections_.status();
+  }
+
+  /// Makes the performance, with places for the objects of the settings and `more`.
+  absl::Status Make(int more) {
+    settings_.most_objects = 2 * static_cast<size_t>(first_objects_.size() + more) + kMoreObjects;
+    environment_bytes_ = Performance::EnvironmentBytes(settings_) * environment_count_;
+    performance_ = nullptr;
+    RETURN_IF_ERROR(GrowMemory());
+    ASSIGN_OR_RETURN(performance_,
+                     Performance::Make(settings_, environment_count_,
+                                       std::max(std::thread::hardware_concurrency(), 1U),
+                                       daemon_.bodies, &daemon_.database.transfers()));
+    for (const v1::PerformedObject& object : first_objects_) RETURN_IF_ERROR(Add(object));
+    return absl::OkStatus();
   }
 
   absl::Status GrowMemory() {
@@ -156,12 +161,17 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   absl::Status Step(const v1::PerformStep& step) {
     const double time_scale = step.has_time_scale() ? step.time_scale() : 1;
     RETURN_IF_ERROR(performance_->CheckScale(time_scale));
+    const int added = step.added_objects_size();
+    // Clients add their first objects with the first step.
+    if (!std::exchange(has_stepped_, true) && added > static_cast<int>(kMoreObjects / 2)) {
+      RETURN_IF_ERROR(Make(added));
+    }
     for (const v1::RemovedObject& removed : step.removed_objects()) {
       ForEach(removed.environments(),
               [&](Environment& environment) { return environment.RemoveObject(removed.object()); });
     }
     for (const v1::PerformedObject& object : step.added_objects()) RETURN_IF_ERROR(Add(object));
-    const PerformRows rows(step, performance_->environment_count(), microphone_count_, rejections_);
+    const PerformRows rows(step, *performance_, rejections_);
     samples_ = performance_->Step(
         [&rows](size_t environment, size_t microphone, ContactIntake& intake) {
           rows.Read(environment, microphone, intake);
@@ -204,7 +214,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   void FillBegun(v1::PerformanceBegun& begun) const {
-    begun.set_sample_rate_hz(sample_rate_hz_);
+    begun.set_sample_rate_hz(settings_.sample_rate_hz);
     begun.set_channel_count(static_cast<uint32_t>(performance_->channel_count()));
     begun.set_latency_frames(static_cast<uint32_t>(performance_->latency_frames()));
   }
@@ -226,7 +236,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   }
 
   void FillFindings(v1::PerformedSamples& message) {
-    for (size_t i = 0; tells_impacts_ && i < performance_->environment_count(); ++i) {
+    for (size_t i = 0; settings_.tells_impacts && i < performance_->environment_count(); ++i) {
       for (const BlowRecord& impact : performance_->environment(i).TakeImpacts()) {
         AddImpact(static_cast<uint32_t>(i), impact, *message.mutable_impacts());
       }
@@ -240,12 +250,13 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   const RenderContext daemon_;
   RenderPlaces places_;
   std::unique_ptr<Performance> performance_;
+  EnvironmentSettings settings_;
+  size_t environment_count_ = 0;
+  google::protobuf::RepeatedPtrField<v1::PerformedObject> first_objects_;  // of the settings
   size_t environment_bytes_ = 0;
-  uint32_t sample_rate_hz_ = 0;
-  size_t microphone_count_ = 0;
-  bool tells_impacts_ = false;
-  bool begins_ = false;   // whether PerformanceBegun is to be sent
-  bool answers_ = false;  // whether samples are to be sent
+  bool begins_ = false;       // whether PerformanceBegun is to be sent
+  bool has_stepped_ = false;  // whether a step has come
+  bool answers_ = false;      // whether samples are to be sent
   bool ended_ = false;
   StepRejections rejections_;          // since the last step
   std::vector<uint64_t> told_counts_;  // rejections of each environment

@@ -58,7 +58,7 @@ absl::StatusOr<std::unique_ptr<ForwardRenderer>> Environment::MakeRenderer(
        .thread_count = 1,
        .size = {.block_frame_count = timing_.block_frame_count,
                 .most_objects = settings_.most_objects,
-                .most_events = kMostEvents},
+                .most_events = settings_.most_events()},
        .is_observation = true},
       bodies_, transfers_);
 }

@@ -28,6 +28,9 @@ struct EnvironmentSettings {
   ContactReading reading{};
   bool tells_impacts = false;
   size_t most_objects = 128;  ///< in an environment, with those that fade out
+
+  /// Most events that fall into the blocks rendered together, and therefore of a step.
+  size_t most_events() const { return 8 * most_objects; }
 };
 
 /// How steps are divided into blocks of the mixer. If the latency allows it, blocks are those of
@@ -44,9 +47,6 @@ StepTiming TimingOf(const EnvironmentSettings& settings);
 /// microphone hears its own rendering. Only one thread at a time may use an object.
 class Environment {
  public:
-  /// Most events that fall into the blocks rendered together, and therefore of a step.
-  static constexpr size_t kMostEvents = 512;
-
   /// `bodies` and `transfers` must outlive this. `balances` is as of IntakeSettings. Reset must be
   /// called first.
   Environment(const EnvironmentSettings& settings, BodyCache& bodies, TransferStore* transfers,

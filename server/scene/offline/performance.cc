@@ -77,8 +77,8 @@ Performance::Performance(const EnvironmentSettings& settings, size_t thread_coun
 }
 
 size_t Performance::EnvironmentBytes(const EnvironmentSettings& settings) {
-  constexpr size_t kRendererBytes = size_t{400} << 10U;
-  return settings.microphones.size() * kRendererBytes;
+  constexpr size_t kEventBytes = 800;
+  return settings.microphones.size() * settings.most_events() * kEventBytes;
 }
 
 absl::Status Performance::CheckScale(double time_scale) const {

@@ -41,6 +41,7 @@ class Performance {
   /// InvalidArgument (INVALID_SETTINGS).
   static absl::Status Validate(const EnvironmentSettings& settings, size_t environment_count);
 
+  const EnvironmentSettings& settings() const { return settings_; }
   size_t environment_count() const { return environments_.size(); }
   Environment& environment(size_t index) { return *environments_[index]; }
 

@@ -320,7 +320,9 @@ TEST_F(PerformanceTest, ARemovedObjectFallsSilentAndItsContactsAreRejected) {
 }
 
 TEST_F(PerformanceTest, MoreEventsThanFitAreRejectedAndNotLostWithoutAWord) {
-  const auto performance = Make(SettingsWith(0), 1);
+  EnvironmentSettings settings = SettingsWith(0);
+  settings.most_objects = 64;
+  const auto performance = Make(settings, 1);
   performance->Step([](size_t, size_t, ContactIntake& intake) {
     for (int i = 0; i < 3000; ++i) intake.Strike(SmallImpulse(1, 1e-4, 1e-7 * i));
   });
