@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,12 +50,13 @@ Request Named(const std::string& name) {
 }
 
 /// All rooms of a daemon, on the null device, which serves on a Unix socket, and clients of it. Its
-/// decompositions fail: the worker is a program that only exits.
+/// decompositions fail: the worker is a program that only exits, or one that only sleeps.
 class ServedDaemon : public testing::Test {
  protected:
   /// Of `settings`, the addresses and the version are set here; `more` are further addresses.
   explicit ServedDaemon(ApiSettings settings = {.client_share = 1},
-                        const std::vector<std::string>& more = {}) {
+                        const std::vector<std::string>& more = {}, bool worker_sleeps = false)
+      : worker_sleeps_(worker_sleeps) {
     settings.addresses = {address_};
     settings.addresses.insert(settings.addresses.end(), more.begin(), more.end());
     settings.version = "test";
@@ -302,6 +305,12 @@ class ServedDaemon : public testing::Test {
     LocalExecutorOptions options;
     options.program = "/bin/false";
     options.directory = folder_ / "work";
+    options.worker_count = 1;
+    if (worker_sleeps_) {
+      options.program = folder_ / "sleeps";
+      std::ofstream(options.program) << "#!/bin/sh\nexec sleep 600\n";
+      std::filesystem::permissions(options.program, std::filesystem::perms::owner_all);
+    }
     return *DecompositionQueue::Make(*database_, *MakeLocalExecutor(options, clock_), clock_,
                                      {.log_event = [this](const Event& event) { Note(event); }});
   }
@@ -321,6 +330,7 @@ class ServedDaemon : public testing::Test {
   std::vector<std::string> events_;
 
  protected:
+  const bool worker_sleeps_;
   TemporaryFolder folder_;
   const std::string address_ = "unix:" + (folder_ / "socket").string();
   SystemClock clock_;
