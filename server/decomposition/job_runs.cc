@@ -83,13 +83,22 @@ void JobRuns::Enqueue(JobRecord record, v1::CreateModalModelRequest request, Job
              .guess_bytes = guess_bytes});
 }
 
-// The transfer's job is stored before the end of the model's, so that a daemon that is killed in
-// between finds it.
-absl::Status JobRuns::FollowByTransfer(const ActiveJob& model) {
-  if (!settings_.transfers || !model.record.transfer_of.empty() || model.given.without_transfer()) {
-    return absl::OkStatus();
+// The jobs of the transfers are stored before the end of the model's, so that a daemon that is
+// killed in between finds them. A model that replaces one with fewer modes, for instance for
+// another material, needs the transfers that this one had, too.
+absl::Status JobRuns::FollowByTransfers(const ActiveJob& model, const Lost& lost) {
+  if (!settings_.transfers || !model.record.transfer_of.empty()) return absl::OkStatus();
+  if (!model.given.without_transfer()) {
+    RETURN_IF_ERROR(FollowByTransfer(model, WantedTransfer(model.record.digest, model.given)));
   }
-  WantedJob wanted = WantedTransfer(model.record.digest, model.given);
+  for (const v1::TransferHeader& transfer : lost.transfers) {
+    RETURN_IF_ERROR(
+        FollowByTransfer(model, WantedTransfer(model.record.digest, transfer, model.record.label)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status JobRuns::FollowByTransfer(const ActiveJob& model, WantedJob wanted) {
   if (const std::optional<ActiveJob> active = jobs_.Find(wanted.digest)) {
     // Its run, if there is one, is on an older revision of the model.
     const ModelReplaced replaced{model.wishes};
@@ -103,6 +112,15 @@ absl::Status JobRuns::FollowByTransfer(const ActiveJob& model) {
   origin.wishes.Add(model.wishes);
   Enqueue(std::move(record), std::move(wanted.request), std::move(origin));
   return absl::OkStatus();
+}
+
+std::vector<v1::TransferHeader> JobRuns::TransfersOf(const std::string& model) {
+  std::vector<v1::TransferHeader> headers;
+  const auto stored = database_.transfers().List(model);
+  if (!stored.ok()) return headers;
+  headers.reserve(stored->size());
+  for (const TransferSummary& transfer : *stored) headers.push_back(transfer.header);
+  return headers;
 }
 
 void JobRuns::StartWhatFits(Notices& notices) {
@@ -173,32 +191,33 @@ void JobRuns::OnProgress(const std::string& digest, const v1::Progress& progress
 
 void JobRuns::OnEnd(const std::string& digest, const Outcome& outcome) {
   phases_.End(digest, clock_.Monotonic());
+  Lost lost{.transfers = TransfersOf(digest)};
   const RunEnded end{Store(digest, outcome)};
+  if (!TransfersOf(digest).empty()) lost.transfers.clear();  // the model has stayed the same
   if (end.outcome.verdict == Verdict::kOk) CopyToWaiting(digest);
-  bool followed = false;
   absl::Status stored;
   for (bool told = false; !told || !stored.ok(); told = true) {
     if (told) std::this_thread::sleep_for(kPauseBeforeStoring);
     Notices notices;
     {
       MutexLock lock(&writer_);
-      stored = TryEnd(digest, end, followed, notices);
+      stored = TryEnd(digest, end, lost, notices);
     }
     TellAll(notices);
     if (!told) events_.LogUnstored("job", digest, stored);
   }
 }
 
-// Returns why the end has to wait until it can be stored, or OK. `followed` says whether the job's
-// transfer is in the queue, and is kept for the next attempt.
-absl::Status JobRuns::TryEnd(const std::string& digest, const RunEnded& end, bool& followed,
+// Returns why the end has to wait until it can be stored, or OK. `lost` is kept for the next
+// attempt.
+absl::Status JobRuns::TryEnd(const std::string& digest, const RunEnded& end, Lost& lost,
                              Notices& notices) {
   const bool succeeded = end.outcome.verdict == Verdict::kOk;
   const ActiveJob job = *jobs_.Find(digest);
   const JobStep step = Transition(job, end);
   const bool ends = step.action == JobAction::kEnd;
   if (ends && !job.deleted()) {
-    absl::Status stored = StoreEnd(job, step.job.record, followed);
+    absl::Status stored = StoreEnd(job, step.job.record, lost);
     if (IsStoredLater(stored) && !stopping_) return stored;
     events_.LogUnstored("job", digest, stored);
   }
@@ -219,10 +238,10 @@ absl::Status JobRuns::TryEnd(const std::string& digest, const RunEnded& end, boo
 
 // If the daemon stops before the end can be stored, the row still says queued, and the next start
 // of the daemon ends the job.
-absl::Status JobRuns::StoreEnd(const ActiveJob& job, const JobRecord& ended, bool& followed) {
-  if (ended.state == v1::JOB_STATE_SUCCEEDED && !followed) {
-    RETURN_IF_ERROR(FollowByTransfer(job));
-    followed = true;
+absl::Status JobRuns::StoreEnd(const ActiveJob& job, const JobRecord& ended, Lost& lost) {
+  if (ended.state == v1::JOB_STATE_SUCCEEDED && !lost.queued) {
+    RETURN_IF_ERROR(FollowByTransfers(job, lost));
+    lost.queued = true;
   }
   return journal_.Put(ended);
 }

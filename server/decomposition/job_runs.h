@@ -71,13 +71,20 @@ class JobRuns {
   }
 
  private:
+  /// What the store of a result leaves to be computed.
+  struct Lost {
+    std::vector<v1::TransferHeader> transfers;  ///< of the model's older revision
+    bool queued = false;                        ///< whether all transfers are in the queue
+  };
+
   void OnProgress(const std::string& digest, const v1::Progress& progress);
   DecompositionTask MakeTask(const ActiveJob& job);
   void OnEnd(const std::string& digest, const Outcome& outcome);
-  absl::Status TryEnd(const std::string& digest, const RunEnded& end, bool& followed,
-                      Notices& notices) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
-  absl::Status StoreEnd(const ActiveJob& job, const JobRecord& ended, bool& followed)
+  absl::Status TryEnd(const std::string& digest, const RunEnded& end, Lost& lost, Notices& notices)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  absl::Status StoreEnd(const ActiveJob& job, const JobRecord& ended, Lost& lost)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  std::vector<v1::TransferHeader> TransfersOf(const std::string& model);
   void CountEnd(const ActiveJob& job) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
   void CopyToWaiting(const std::string& coarse) ABSL_LOCKS_EXCLUDED(writer_);
   void ReleaseWaiting(const std::string& coarse, Notices& notices)
@@ -85,7 +92,10 @@ class JobRuns {
   Outcome Store(const std::string& digest, const Outcome& outcome);
   absl::Status PutResult(const JobRecord& job, const std::filesystem::path& file);
   bool stops() const ABSL_LOCKS_EXCLUDED(writer_);
-  absl::Status FollowByTransfer(const ActiveJob& model) ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  absl::Status FollowByTransfers(const ActiveJob& model, const Lost& lost)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
+  absl::Status FollowByTransfer(const ActiveJob& model, WantedJob wanted)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(writer_);
 
   ModeDatabase& database_;
   const Clock& clock_;

@@ -40,6 +40,20 @@ WantedJob WantedTransfer(const std::string& model, const v1::CreateModalModelReq
   return Name(model, std::move(use));
 }
 
+WantedJob WantedTransfer(const std::string& model, const v1::TransferHeader& stored,
+                         const std::string& label) {
+  constexpr double kDensityKgPerM3 = 1000;  // Only the speed of sound matters.
+  const double speed_m_per_s = stored.speed_ratio() * kSoundSpeedInAirMPerS;
+  v1::CreateModalModelRequest use;
+  use.mutable_material()->set_density_kg_per_m3(kDensityKgPerM3);
+  use.mutable_material()->set_young_pa(kDensityKgPerM3 * speed_m_per_s * speed_m_per_s);
+  use.set_size(1);
+  use.set_min_frequency_hz(20);
+  use.mutable_transfer()->set_accuracy_db(stored.transfer_settings().accuracy_db());
+  use.set_label(TransferLabel(label));
+  return Name(model, std::move(use));
+}
+
 absl::StatusOr<WantedJob> WantedTransfer(const std::string& model,
                                          const v1::CreateTransferRequest& request) {
   v1::CreateModalModelRequest use;

@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "carillon/v1/modal_model_service.pb.h"
+#include "carillon/v1/transfer.pb.h"
 
 namespace carillon {
 
@@ -26,6 +27,11 @@ WantedJob WantedModel(const v1::CreateModalModelRequest& resolved);
 /// Returns the transfer to compute after the model of a resolved request, which is stored as
 /// `model`. The model's digest and the step number of the speed ratio name the job.
 WantedJob WantedTransfer(const std::string& model, const v1::CreateModalModelRequest& resolved);
+
+/// Returns the transfer that a stored model lacks since it has replaced one for which `stored` was
+/// computed.
+WantedJob WantedTransfer(const std::string& model, const v1::TransferHeader& stored,
+                         const std::string& label);
 
 /// Returns the transfer of the stored model `model` that a client asks for. Errors: those of
 /// ResolveUse.

@@ -127,6 +127,24 @@ TEST_F(TransferJobTest, IsComputedOnceForAllMaterialsOfOneSpeedOfSound) {
   EXPECT_EQ(Runs(), "model\ntransfer\ntransfer\n") << "a more exact one is another computation";
 }
 
+TEST_F(TransferJobTest, IsComputedAnewForAModelThatReplacesItsOwn) {
+  MakeQueue(kWriteKind);
+  Submit();
+  AwaitEnd(digest_);
+  AwaitEnd(transfer_);
+  v1::Material& softer = *request_.mutable_material();
+  softer = *ResolveMaterial(softer);
+  softer.set_young_pa(softer.young_pa() / 4);
+  const v1::CreateModalModelRequest wider = *ResolveRequest(request_);
+  ASSERT_EQ(RequestDigest(wider), digest_);
+  WriteModel("model", WantedEigenvalue(wider));
+  Submit();
+  AwaitEnd(digest_);
+  EXPECT_EQ(AwaitEnd(WantedTransfer(digest_, wider).digest).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(AwaitEnd(transfer_).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(Runs(), "model\ntransfer\nmodel\ntransfer\ntransfer\n");
+}
+
 TEST_F(TransferJobTest, RefusesAModelThatIsNotStoredAndSettingsThatAreNone) {
   MakeQueue(kWriteKind);
   v1::CreateTransferRequest wanted;
