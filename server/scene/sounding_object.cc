@@ -286,14 +286,19 @@ absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const Sounding
                                                   const ObjectProperties& asked,
                                                   const MixerBus& output,
                                                   std::shared_ptr<Voice> voice,
-                                                  TransferStore* transfers) {
+                                                  TransferStore* transfers,
+                                                  const std::shared_ptr<const Transfer>* chosen) {
   const ModalModel& model = *body->model;
   ObjectProperties properties = asked;
   RETURN_IF_ERROR(MatchRegions(model, properties.material));
   RETURN_IF_ERROR(Check(model, properties));
   const MixerSettings& settings = output.mixer.settings();
-  ASSIGN_OR_RETURN(std::shared_ptr<const Transfer> transfer,
-                   ChooseTransfer(model, properties, transfers));
+  std::shared_ptr<const Transfer> transfer;
+  if (chosen != nullptr) {
+    transfer = *chosen;
+  } else {
+    ASSIGN_OR_RETURN(transfer, ChooseTransfer(model, properties, transfers));
+  }
   auto directivity = DirectivityOf(transfer, voice.get(), properties.material.size);
   const SoundingBand band{.directed = directivity.has_value()};
   ASSIGN_OR_RETURN(const SoundingModes sounding,

@@ -97,11 +97,11 @@ struct MixerBus {
 /// Applies material and size to a model, and puts its oscillator bank with `voice` on a bus.
 /// Errors: InvalidArgument (INVALID_SETTINGS: size or gain out of range; INVALID_POSE),
 /// FailedPrecondition (POISSON_RATIO_DIFFERS, NO_MODE_IN_BAND with the figure first_mode_hz,
-/// REGION_MATERIAL_DIFFERS), ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer.
-absl::StatusOr<SoundingObject> MakeSoundingObject(std::shared_ptr<const SoundingBody> body,
-                                                  const ObjectProperties& asked,
-                                                  const MixerBus& output,
-                                                  std::shared_ptr<Voice> voice = nullptr,
-                                                  TransferStore* transfers = nullptr);
+/// REGION_MATERIAL_DIFFERS), ResourceExhausted (TOO_MANY_OBJECTS), and those of ChooseTransfer,
+/// unless `chosen` points to the object's transfer.
+absl::StatusOr<SoundingObject> MakeSoundingObject(
+    std::shared_ptr<const SoundingBody> body, const ObjectProperties& asked, const MixerBus& output,
+    std::shared_ptr<Voice> voice = nullptr, TransferStore* transfers = nullptr,
+    const std::shared_ptr<const Transfer>* chosen = nullptr);
 
 }  // namespace carillon

@@ -122,6 +122,27 @@ class TransferTest(ScratchTest):
         self.assertEqual(self.add_object(model)[1], radiation_pb2.RADIATION_MODEL_RADIATED_POWER)
         self.assertEqual((self.folder / "runs").read_text().split(), ["transfer"] * 2)
 
+    def test_a_performance_says_that_a_transfer_is_missing_and_sounds_alike_after_each_reset(self):
+        model = self.client.model(max_frequency_hz=8000)
+
+        def heard(performance):
+            performance.reset()
+            return performance.step(impacts=carillon.Impacts(1, [meshes.BAR_SIZE], [(0, 0.3e-3, -1e-3)], durations=0))[0]
+
+        with carillon.connect(self.daemon.server) as c:
+            with c.perform(step=0.1, microphones=[carillon.Omni()] * 2) as performance:
+                performance.add(model, meshes.MATERIAL)
+                with self.assertWarns(carillon.TransferWarning):
+                    before = heard(performance)
+                (self.folder / "enough").touch()
+                self.await_transfer()
+                numpy.testing.assert_array_equal(heard(performance), before)
+            with c.perform(step=0.1, microphones=[carillon.Omni()] * 2) as performance:
+                performance.add(model, meshes.MATERIAL)
+                after = heard(performance)
+        numpy.testing.assert_array_equal(after[0, 0], after[0, 1])
+        self.assertGreater(abs(after - before).max(), 0.01 * abs(before).max())
+
     def assert_changed_by(self, arrays, before, after):
         changes_db = []
         for m in range(3):

@@ -44,6 +44,7 @@ class Performance {
     this.next = {}; // what the next step brings beside its contacts
     this.handle = 0;
     this.rejectedCount = 0;
+    this.paperCount = 0;
   }
 
   async begin() {
@@ -154,6 +155,11 @@ class Performance {
       ({ samples: answer } = await this.receive());
       pieces.push(answer.samples);
     }
+    if (answer.paperCouplingObjectCount > this.paperCount) {
+      await this.client.warnOfTransfers((step.addedObjects ?? []).map(({ object }) => object.modalModel),
+        "the objects sound by the paper's coupling, also after a reset");
+    }
+    this.paperCount = answer.paperCouplingObjectCount;
     const performed = { samples: samplesOf(pieces), frameCount: answer.frameCount, impacts: answer.impacts };
     if (answer.rejectedCount > this.rejectedCount) {
       this.rejectedCount = answer.rejectedCount;

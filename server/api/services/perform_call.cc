@@ -241,6 +241,11 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
         AddImpact(static_cast<uint32_t>(i), impact, *message.mutable_impacts());
       }
     }
+    uint32_t paper_count = 0;
+    for (size_t i = 0; i < performance_->environment_count(); ++i) {
+      paper_count += performance_->environment(i).paper_coupling_object_count();
+    }
+    message.set_paper_coupling_object_count(paper_count);
     message.set_rejected_count(rejected_count_);
     message.clear_last_rejection();
     if (!last_rejection_.ok())

@@ -70,7 +70,8 @@ absl::Status Environment::Reset() {
   for (const Microphone& microphone : settings_.microphones) {
     ASSIGN_OR_RETURN(auto renderer, MakeRenderer(microphone));
     for (const auto& [handle, object] : objects_) {
-      RETURN_IF_ERROR(renderer->AddObject(handle, object.model, object.properties));
+      RETURN_IF_ERROR(
+          renderer->AddObject(handle, object.model, object.properties, &object.transfer));
     }
     heard_.push_back({.renderer = std::move(renderer)});
   }
@@ -79,10 +80,14 @@ absl::Status Environment::Reset() {
 
 absl::Status Environment::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
                                     const ObjectProperties& properties) {
+  std::shared_ptr<const Transfer> transfer;
   for (const Heard& heard : heard_) {
-    RETURN_IF_ERROR(heard.renderer->AddObject(handle, model, properties));
+    const bool is_first = &heard == &heard_.front();
+    RETURN_IF_ERROR(
+        heard.renderer->AddObject(handle, model, properties, is_first ? nullptr : &transfer));
+    if (is_first) transfer = heard.renderer->TransferOf(handle);
   }
-  objects_[handle] = {std::move(model), properties};
+  objects_[handle] = {std::move(model), properties, std::move(transfer)};
   return absl::OkStatus();
 }
 

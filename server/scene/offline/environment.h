@@ -57,7 +57,8 @@ class Environment {
         transfers_(transfers),
         balances_(balances) {}
 
-  /// Ends all sound at once, and begins anew with the objects as they were added. Errors: those of
+  /// Ends all sound at once, and begins anew with the objects as they were added: a transfer that
+  /// has been stored since then changes nothing. Errors: those of
   /// ForwardRenderer::Make.
   absl::Status Reset();
 
@@ -85,6 +86,9 @@ class Environment {
   uint64_t rejected_count() const;
   absl::Status last_rejection() const { return first().intake().last_rejection(); }
 
+  /// Number of objects that sound by the paper's coupling because no transfer fits their material.
+  uint32_t paper_coupling_object_count() const { return first().paper_coupling_object_count(); }
+
   /// What is unusual about the contacts since the last reset, and the number of impulses taken.
   IntakeFindings findings() const { return first().intake().findings(); }
   uint64_t accepted_count() const { return first().statistics().accepted_count; }
@@ -93,6 +97,7 @@ class Environment {
   struct AddedObject {
     std::shared_ptr<const ModalModel> model;
     ObjectProperties properties;
+    std::shared_ptr<const Transfer> transfer;  // that the object had first, null for none
   };
   /// What one microphone hears.
   struct Heard {

@@ -101,12 +101,13 @@ ForwardRenderer::ForwardRenderer(const OfflineSettings& settings, BodyCache& bod
       intake_(scene_, target_, IntakeSettingsOf(settings, blows_)) {}
 
 absl::Status ForwardRenderer::AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
-                                        const ObjectProperties& properties) {
+                                        const ObjectProperties& properties,
+                                        const std::shared_ptr<const Transfer>* chosen) {
   RETURN_IF_ERROR(scene_.CheckFree(handle));
   ASSIGN_OR_RETURN(std::shared_ptr<const SoundingBody> body, bodies_.Get(std::move(model)));
   auto voice = MakeVoice(settings_.space, properties.pose, mixer_.settings());
   ASSIGN_OR_RETURN(SoundingObject object, MakeSoundingObject(std::move(body), properties, {mixer_},
-                                                             std::move(voice), transfers_));
+                                                             std::move(voice), transfers_, chosen));
   if (object.transfer == nullptr && properties.radiation == RadiationModel::kDefault) {
     ++paper_coupling_object_count_;
   }
@@ -119,6 +120,12 @@ absl::Status ForwardRenderer::RemoveObject(uint32_t handle) {
   mixer_.FadeOut(object.bank);
   removed_ = true;
   return absl::OkStatus();
+}
+
+std::shared_ptr<const Transfer> ForwardRenderer::TransferOf(uint32_t handle) const {
+  const MutexLock lock(&scene_.mutex());
+  const absl::StatusOr<const SoundingObject*> object = scene_.Find(handle);
+  return object.ok() ? (*object)->transfer : nullptr;
 }
 
 std::optional<Pose> ForwardRenderer::PoseOf(uint32_t handle) const {

@@ -82,13 +82,18 @@ class ForwardRenderer {
                                                                BodyCache& bodies,
                                                                TransferStore* transfers = nullptr);
 
-  /// Adds an object. Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
+  /// Adds an object, with the transfer to which `chosen` points or, if it is null, with the one
+  /// that is stored. Errors: AlreadyExists (OBJECT_EXISTS), and those of MakeSoundingObject.
   absl::Status AddObject(uint32_t handle, std::shared_ptr<const ModalModel> model,
-                         const ObjectProperties& properties);
+                         const ObjectProperties& properties,
+                         const std::shared_ptr<const Transfer>* chosen = nullptr);
 
   /// Removes an object. Its sound fades out within 10 ms, and what is on its way to it is lost.
   /// Errors: NotFound (OBJECT_NOT_FOUND).
   absl::Status RemoveObject(uint32_t handle);
+
+  /// Returns the transfer of an object, or null if there is none.
+  std::shared_ptr<const Transfer> TransferOf(uint32_t handle) const;
 
   /// Returns the newest pose of an object, or nothing if there is no such object, or it has none.
   std::optional<Pose> PoseOf(uint32_t handle) const;

@@ -13,7 +13,7 @@ from typing import Any, Optional, TypeVar, Union
 import grpc
 import numpy
 
-from carillon import checks, contacts, errors, materials
+from carillon import checks, contacts, errors, job_calls, materials
 from carillon.columns import append
 from carillon.connection import Connection
 from carillon.contacts import Array, ContactForces, Contacts, Impacts, PoseLike, Poses, checked_scale
@@ -140,7 +140,7 @@ class PerformanceCalls(Block):
         self._settings = settings
         self._next = performance_pb2.PerformStep()  # what the next step brings beside its contacts
         self._handle = 0
-        self._rejected_count = 0
+        self._rejected_count = self._paper_count = 0
         self._call: Any = None
         self.warnings: list[warning_pb2.Warning] = []
         self.environment_count: int = max(settings.environment_count, 1)
@@ -229,6 +229,10 @@ class PerformanceCalls(Block):
             pieces.append(message)
         samples = numpy.frombuffer(pieces[0].samples if len(pieces) == 1 else b"".join(p.samples for p in pieces),
                                    "<f4")
+        if message.paper_coupling_object_count > self._paper_count:
+            await job_calls.warn_of_transfers(self._client, {added.object.modal_model for added in step.added_objects},
+                                              "the objects sound by the paper's coupling, also after a reset")
+        self._paper_count = message.paper_coupling_object_count
         performed = (samples.reshape(self.environment_count, self.channel_count, message.frame_count),
                      _heard(message.impacts))
         if message.rejected_count > self._rejected_count:
