@@ -183,12 +183,17 @@ void MomentumBalance::NoteFlight(Body& body) {
   }
   if (flights_.size() == kMostFlights) return;
   flights_.push_back(acceleration);
-  has_gravity_ = flights_.size() >= 3;
   for (size_t axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Vector3& flight : flights_) values.push_back(flight[axis]);
     gravity_[axis] = Median(values);
   }
+  // A body that a motor moves, as a link of a robot, accelerates otherwise each time.
+  const auto alike = std::ranges::count_if(flights_, [this](const Vector3& flight) {
+    return Length(Sum(flight, gravity_, -1)) < kNothing * Length(gravity_);
+  });
+  has_gravity_ = flights_.size() >= 3 &&
+                 static_cast<double>(alike) >= kMost * static_cast<double>(flights_.size());
 }
 
 double MomentumBalance::Gravity() const { return has_gravity_ ? Length(gravity_) : kEarthMPerS2; }

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <vector>
 
 namespace carillon {
@@ -235,6 +236,20 @@ TEST(MomentumBalance, ALiftOrAHandThatCarriesABodyIsNoMistake) {
   }
   EXPECT_THAT(Named(lift, kRateHz), IsEmpty());
   EXPECT_THAT(Named(hand, kRateHz), IsEmpty());
+}
+
+TEST(MomentumBalance, ALinkThatAMotorPressesOnATableIsNoMistake) {
+  constexpr double kRateHz = 240;
+  for (double pressed = 0.05; pressed < 0.6; pressed += 0.0125) {
+    std::vector<Told> steps;
+    for (int k = 1; k < 600; ++k) {
+      const double up_m = 0.05 * std::max(0.0, std::sin(4 * std::numbers::pi * k / kRateHz));
+      Told told{.position = {0.1 * std::sin(2 * std::numbers::pi * k / kRateHz), 0, up_m}};
+      if (up_m == 0) told.impulses = {{0, 0, pressed * kMassKg * kGravityMPerS2 / kRateHz}};
+      steps.push_back(told);
+    }
+    EXPECT_THAT(Named(steps, kRateHz), IsEmpty()) << pressed;
+  }
 }
 
 TEST(MomentumBalance, WithoutPosesItNamesForcesAndEqualContacts) {
