@@ -461,7 +461,7 @@ absl::Status RenderStems(const client::Client& daemon, const FoleyOptions& optio
   for (const v1::ContactTraceObject& object : trace.objects) {
     RETURN_IF_ERROR(trace.Write(whole.trace, earlier_s, object.handle()));
     RenderOptions stem = whole;
-    const std::string name = absl::StrReplaceAll(object.label(), {{"/", "_"}});
+    const std::string name = absl::StrReplaceAll(object.label(), {{"/", "_"}, {"\\", "_"}});
     stem.out =
         (fs::path(options.stems) / absl::StrCat(object.handle(), "-", name, ".wav")).string();
     RETURN_IF_ERROR(Render(daemon, stem, false).status());
