@@ -8,7 +8,7 @@ import bpy
 import numpy
 from bpy.app.handlers import persistent
 
-from . import bodies, strip
+from . import bodies, rebake, strip
 
 # What only says how Blender shows a thing, or what follows from other things.
 SHOWN_ONLY = {"name", "show_expanded", "show_in_editmode", "show_on_cage", "is_active", "show_viewport", "show_render"}
@@ -35,7 +35,9 @@ def digest(scene):
     for obj in bodies.taking_part(scene):
         _add_body(add, seen, obj)
     if scene.camera and chosen.use_camera:
-        _add_place(add, scene.camera)
+        for frame, camera in rebake.views(scene) or [(None, scene.camera)]:
+            add(frame)
+            _add_place(add, camera)
     return seen.hexdigest()
 
 

@@ -22,6 +22,8 @@ class Motion:
     how: str                 # what the poses are, as text
     steps: bool = False      # each frame is a step of the simulation
     shown: tuple = (1, 24)   # the scene's first frame, and its frames a second
+    length_s: float = 0      # from the beginning of the first frame to the end of the last one
+    cuts: tuple = ()         # frames at which a marker changes the camera
     hints: list = dataclasses.field(default_factory=list)  # why all of the simulation may look odd, and the remedy
 
     def write(self, path, scene):
@@ -49,8 +51,10 @@ def read(scene, tell):
     free = [obj for obj in objects if obj in bodies.in_world(scene) and bodies.is_free(obj)]
     tell(0.05, "Reading the animation")
     shown = scene.frame_start, rebake.frames_per_s(scene)
-    found = _read_simulated(scene, objects, free, tell) if free else _read_keyed(scene, objects)
-    found.shown = shown
+    length_s = (scene.frame_end + 1 - scene.frame_start) / shown[1]
+    cuts = rebake.cuts(scene)
+    found = _read_simulated(scene, objects, free, cuts, tell) if free else _read_keyed(scene, objects)
+    found.shown, found.length_s, found.cuts = shown, length_s, cuts
     return found
 
 
@@ -101,7 +105,7 @@ def _key_density(objects):
     return max(1, round(1 / max(0.01, float(numpy.median(distances))))) if distances else 1
 
 
-def _read_simulated(scene, objects, free, tell):
+def _read_simulated(scene, objects, free, cuts, tell):
     cache = scene.rigidbody_world.point_cache
     start, last = cache.frame_start, min(scene.frame_end, cache.frame_end)
     shown = scene.frame_start
@@ -131,6 +135,8 @@ def _read_simulated(scene, objects, free, tell):
                          "Bake, and bake it again")
         if alike:
             matrices = _between(seen, n)
+            for cut in [frame - begin for frame in cuts if begin < frame <= last]:
+                matrices[-1, (cut - 1) * n:cut * n] = seen[-1, cut - 1]  # until the cut the camera keeps its place
             matrices[rows, (start - begin) * n:] = fine
     n = n if matrices is not seen else 1
     return Motion(surfaces, matrices[:, (shown - begin) * n:], n * rate, how, n == steps, hints=hints)

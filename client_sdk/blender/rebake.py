@@ -40,6 +40,18 @@ def _exact_time_scale(scene, n):
     return world.time_scale
 
 
+def views(scene):
+    """Frames and the cameras that markers give the scene from there on, in the order of time."""
+    bound = [(marker.frame, marker.camera) for marker in scene.timeline_markers if marker.camera]
+    return sorted(bound, key=lambda view: view[0])
+
+
+def cuts(scene):
+    """The frames at which the scene's camera becomes another."""
+    found = views(scene)
+    return tuple(frame for (_, before), (frame, camera) in zip(found, found[1:]) if camera != before)
+
+
 def poses(scene, objects, frames):
     """World matrices (O, F, 4, 4) of objects at frames in their order; None among them stands for the scene's camera.
     The scene is simulated as far as its cache does not have it."""

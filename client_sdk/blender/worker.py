@@ -119,8 +119,9 @@ def _are_few(found):
 def _words(scene, found, folder):
     chosen = scene.carillon
     # A movie ends with its last frame, so that the sound ends there, too.
-    length = str((found.matrices.shape[1] - 1) / found.frames_per_s)
-    words = ["--material-masses", "--out", folder / "sound.wav", "--length", length, "--tail", length,
+    first, rate = found.shown
+    words = ["--material-masses", "--out", folder / "sound.wav", "--length", str(found.length_s),
+             "--tail", str(found.length_s),
              "--channels", chosen.channels, "--gain", f"{chosen.gain_db}dB",
              "--striker", chosen.striker, "--roughness", str(chosen.roughness)]
     words += ["--normalize"] if chosen.normalize else []
@@ -128,7 +129,9 @@ def _words(scene, found, folder):
     words += ["--frames-are-steps"] if found.steps else []
     words += ["--force"] if chosen.force else []
     words += ["--stems", folder / "stems"] if chosen.stems or _are_few(found) else []
-    words += ["--listener", "camera"] if chosen.use_camera and scene.camera else []
+    if chosen.use_camera and scene.camera:
+        words += ["--listener", "camera"]
+        words += [word for frame in found.cuts if frame > first for word in ("--cut", str((frame - first) / rate))]
     for body in found.bodies:
         of = bpy.data.objects[body.name].carillon
         pattern = re.sub(r"([\\*?\[])", r"\\\1", body.name)

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <system_error>
+#include <utility>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
@@ -399,6 +401,21 @@ absl::StatusOr<const motion::SceneListener*> FindListener(const FoleyOptions& op
                  absl::StrCat("no camera has the name ", options.listener, ": see --list"));
 }
 
+/// Lets the listener jump at the frames of these times, since the second of two poses at one time
+/// takes effect at once.
+void AddCuts(const std::vector<double>& cuts_s, double frame_s,
+             std::vector<v1::ContactStep>& steps) {
+  for (const double cut_s : cuts_s) {
+    const auto at = std::ranges::find_if(
+        steps, [&](const auto& step) { return step.time_s() > cut_s - 0.5 * frame_s; });
+    if (at == steps.begin() || at == steps.end()) continue;
+    v1::ContactStep before;
+    before.set_time_s(at->time_s());
+    *before.mutable_listener() = std::prev(at)->listener();
+    steps.insert(at, std::move(before));
+  }
+}
+
 absl::StatusOr<FoleyTrace> MakeTrace(AwaitedJobs& jobs, const FoleyOptions& options,
                                      const FoleyScene& foley, const motion::FoundContacts& found) {
   const motion::Motion& motion = foley.scene.motion;
@@ -445,6 +462,7 @@ absl::StatusOr<FoleyTrace> MakeTrace(AwaitedJobs& jobs, const FoleyOptions& opti
     for (size_t k = 0; k < trace.steps.size(); ++k) {
       Set(*trace.steps[k].mutable_listener(), listener->poses[k]);
     }
+    AddCuts(options.cuts_s, motion.frame_s, trace.steps);
   }
   return trace;
 }

@@ -28,8 +28,9 @@ struct FoleyOptions {
   std::string silent_striker = "steel";
   double roughness_depth = 0;
   std::string listener;  ///< a camera's name; empty: the first one, if two channels are asked for
-  std::string trace;     ///< the contact trace to keep
-  std::string stems;     ///< a folder for the sound of each body alone
+  std::vector<double> cuts_s;  ///< times of the file when the listener jumps
+  std::string trace;           ///< the contact trace to keep
+  std::string stems;           ///< a folder for the sound of each body alone
   bool list = false, force = false;
   bool frames_are_steps = false;
   /// Impulses are scaled to the masses that the materials give.

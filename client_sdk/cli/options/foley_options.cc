@@ -96,6 +96,9 @@ void AddWorld(CLI::App& foley, FoleyOptions& options) {
              0, 10);
   foley.add_option("--listener", options.listener,
                    "The camera that hears [with two channels the first one]");
+  foley.add_option("--cut", options.cuts_s,
+                   "A time of the file, s, when the listener jumps, as in a cut from one camera to "
+                   "another; otherwise it moves from one pose to the next");
 }
 
 }  // namespace

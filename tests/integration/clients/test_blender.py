@@ -16,6 +16,7 @@ import sound
 from daemon import BIN, ROOT
 
 STEPS_PER_S = 250
+BAR = r"Bar \[1]"
 # The first mode of a free bar, 22.373 / (2 pi) sqrt(E I / (rho A)) / l^2, of structural steel.
 BAR_HZ = 22.373 / (2 * numpy.pi) * (210e9 / 7850 / 12) ** 0.5 * 0.015 / 0.3**2
 
@@ -52,7 +53,7 @@ class BlenderTest(unittest.TestCase):
         self.assertIn("bit for bit", self.found["fall"]["report"])
         self.assertTrue(self.found["unchanged"])
         seen = numpy.array(self.found["seen"], numpy.float32)[:, :3, 3]
-        baked = read_motion(self.folder / "carillon" / "fäll of a bar-Scene" / "motion.glb", "Bar [1]")
+        baked = read_motion(self.folder / "carillon" / "fäll of a bar-Scene" / "motion.glb", BAR)
         self.assertEqual(len(baked), 10 * (len(seen) - 1) + 1)
         numpy.testing.assert_array_equal(baked[::10], seen[:, [0, 2, 1]] * numpy.float32([1, 1, -1]))
 
@@ -67,7 +68,7 @@ class BlenderTest(unittest.TestCase):
 
     def test_the_sound_begins_with_the_impact_at_the_pitch_and_level_of_the_bar(self):
         folder = self.folder / "carillon" / "fäll of a bar-Scene"
-        heights = read_motion(folder / "motion.glb", "Bar [1]")[:, 1].astype(float)
+        heights = read_motion(folder / "motion.glb", BAR)[:, 1].astype(float)
         jumps = numpy.diff(heights, 2) * STEPS_PER_S + 9.81 / STEPS_PER_S
         impact_s = (1 + numpy.argmax(jumps > 0.3)) / STEPS_PER_S
         samples = sound.read_wave(folder / "sound.wav").sum(axis=-1) / 2
@@ -83,9 +84,10 @@ class BlenderTest(unittest.TestCase):
     def test_the_sequencer_has_the_sound_and_its_stems(self):
         whole, stem = sorted(self.found["strips"], key=lambda strip: strip["channel"])
         self.assertEqual((whole["name"], whole["start"], whole["mute"]), ("Carillon", 5, False))
-        self.assertEqual((stem["name"], stem["start"], stem["mute"]), ("Carillon Bar [1]", 5, True))
+        self.assertEqual((stem["name"], stem["start"], stem["mute"]), ("Carillon Bar _[1]", 5, True))
         samples = sound.read_wave(pathlib.Path(whole["path"]))
-        self.assertEqual(samples.shape, (sound.RATE, 2))  # 25 frames
+        self.assertEqual(samples.shape, (26 * sound.RATE // 25, 2))
+        self.assertEqual((whole["frames"], stem["frames"]), (26, 26))
         numpy.testing.assert_allclose(sound.read_wave(pathlib.Path(stem["path"])), samples, atol=1e-5)
 
     def test_a_change_marks_the_sound_as_out_of_date(self):
@@ -94,11 +96,11 @@ class BlenderTest(unittest.TestCase):
             "friction": True, "shape": True, "all again": False})
 
     def test_what_fails_has_a_name_and_leaves_the_strip(self):
-        for case, reason, body in (("material", "UNKNOWN_MATERIAL", "Bar [1]"), ("time", "TIME_REMAPPED", None),
-                                   ("programs", "CARILLON_MISSING", None), ("open", "SURFACE_OPEN", "Bar [1]"),
+        for case, reason, body in (("material", "UNKNOWN_MATERIAL", BAR), ("time", "TIME_REMAPPED", None),
+                                   ("programs", "CARILLON_MISSING", None), ("open", "SURFACE_OPEN", BAR),
                                    ("no material", "NO_MATERIAL", None),
-                                   ("negative scale", "SCALE_NEGATIVE", "Bar [1]"),
-                                   ("shape keys", "BODY_DEFORMS", "Bar [1]")):
+                                   ("negative scale", "SCALE_NEGATIVE", BAR),
+                                   ("shape keys", "BODY_DEFORMS", BAR)):
             refused = self.found["refused"][case]
             self.assertEqual(refused["result"], ["CANCELLED"], case)
             self.assertTrue(refused["fault"].startswith(reason + ": "), refused)
@@ -120,6 +122,15 @@ class BlenderTest(unittest.TestCase):
         self.assertEqual(self.found["keyed"]["result"], ["FINISHED"], self.found["keyed"])
         samples = sound.read_wave(self.folder / "carillon" / "keyed-Scene" / "sound.wav").sum(axis=-1)
         self.assertAlmostEqual(self.onset_s(samples), self.found["keyed lands"], delta=0.001)
+
+    def test_a_marker_that_changes_the_camera_cuts_the_sound(self):
+        self.assertFalse(self.found["keyed stale"])
+        samples = sound.read_wave(self.folder / "carillon" / "keyed-Scene" / "sound.wav")
+        cut = 17 * sound.RATE // 60
+        left, right = numpy.abs(samples[cut - sound.RATE // 100:cut]).max(axis=0)
+        self.assertAlmostEqual(left / right, 1, delta=0.01)
+        left, right = numpy.abs(samples[cut + sound.RATE // 20:cut + sound.RATE // 10]).max(axis=0)
+        self.assertLess(left, 0.05 * right)
 
     def test_the_report_names_sound_without_radiation(self):
         self.assertIn("Radiation", self.found["usual"]["report"])

@@ -55,7 +55,7 @@ def bake(scene):
 
 def strips(scene):
     return [{"name": strip.name, "channel": strip.channel, "start": strip.frame_start, "mute": strip.mute,
-             "volume": strip.volume, "path": bpy.path.abspath(strip.sound.filepath)}
+             "frames": strip.frame_final_duration, "volume": strip.volume, "path": bpy.path.abspath(strip.sound.filepath)}
             for strip in scene.sequence_editor.sequences]
 
 
@@ -72,7 +72,7 @@ def fall():
     bpy.ops.rigidbody.world_add()
     scene.rigidbody_world.point_cache.frame_start = 5
     add("Floor", 'PASSIVE', (0, 0, 0), (1, 1, 1), size=4)
-    bar = add("Bar [1]", 'ACTIVE', (0, 0, 0.3), (0.3, 0.03, 0.015), (0.1, 0.2, 0))
+    bar = add("Bar \\[1]", 'ACTIVE', (0, 0, 0.3), (0.3, 0.03, 0.015), (0.1, 0.2, 0))
     bar.carillon.material = "structural_steel"
     scene.carillon.normalize, scene.carillon.stems = False, True
     bpy.ops.object.camera_add(location=(0, -1, 0.3), rotation=(1.5708, 0, 0))
@@ -176,7 +176,8 @@ def usual():
 
 
 def keyed():
-    """The bounce of a bar by keys alone, one for each frame, on a floor that is no rigid body."""
+    """The bounce of a bar by keys alone, one for each frame, on a floor that is no rigid body. After the blow a marker
+    changes to a camera that has the bar on its right."""
     scene = empty_scene("keyed", 60)
     scene.carillon.radiation = True
     add("Floor", None, (0, 0, 0), (1, 1, 1), size=4).carillon.material = "none"
@@ -190,7 +191,14 @@ def keyed():
             scene.frame_end = frame - 1
             break
         bar.keyframe_insert("location", frame=frame)
+    bpy.ops.object.camera_add(location=(-1, 0, 0.3), rotation=(1.5708, 0, 0))
+    for frame, camera in ((1, scene.camera), (18, bpy.context.object)):
+        scene.timeline_markers.new("view", frame=frame).camera = camera
     found["keyed"] = bake(scene)
+    scene.frame_set(30)
+    freshness.look(scene)
+    found["keyed stale"] = scene.carillon.out_of_date
+    scene.frame_set(1)
     found["keyed lands"] = lands
     bar.animation_data_clear()
     found["still"] = bake(scene)
