@@ -4,6 +4,7 @@ them."""
 
 import dataclasses
 
+import bmesh
 import bpy
 import numpy
 
@@ -150,15 +151,57 @@ def _hints(obj, vertices, final):
         yield "with the shape Mesh what moves jitters in Blender's simulator: choose Convex Hull, or Compound Parent"
 
 
-def _read_simulated(body, obj, depsgraph, scale, time_scale):
+def _concatenated(surfaces):
+    vertices, triangles = zip(*surfaces)
+    first = numpy.cumsum([0, *map(len, vertices)])
+    return numpy.concatenate(vertices), numpy.concatenate([part + at for part, at in zip(triangles, first)])
+
+
+def _united(surfaces):
+    """The surface around all of several closed ones, which may touch or overlap, by Blender's exact union."""
+    size = numpy.ptp(numpy.concatenate([vertices for vertices, _ in surfaces]), 0).max()
+    grid = max(1e-6 * size, 1e-30)  # on which faces that touch but for rounding lie in one plane
+    others = bpy.data.collections.new("parts")
+    parts = []
+    for vertices, triangles in surfaces:
+        mesh = bpy.data.meshes.new("part")
+        mesh.from_pydata((numpy.round(vertices / grid) * grid).tolist(), [], triangles.tolist())
+        parts.append(bpy.data.objects.new("part", mesh))
+    for part in parts[1:]:
+        others.objects.link(part)
+    union = parts[0].modifiers.new("union", 'BOOLEAN')
+    union.operation, union.solver, union.operand_type, union.collection = 'UNION', 'EXACT', 'COLLECTION', others
+    scene = bpy.data.scenes.new("union")  # since a change in the scene itself may start its simulation anew
+    scene.collection.objects.link(parts[0])
+    scene.collection.children.link(others)
+    layer = scene.view_layers[0]
+    layer.update()
+    united = bmesh.new()
+    united.from_object(parts[0], layer.depsgraph)
+    bmesh.ops.dissolve_degenerate(united, dist=10 * grid, edges=united.edges[:])
+    bmesh.ops.triangulate(united, faces=united.faces[:])
+    vertices = numpy.array([vertex.co[:] for vertex in united.verts], float)
+    triangles = numpy.array([[vertex.index for vertex in face.verts] for face in united.faces], numpy.int32)
+    united.free()
+    bpy.data.scenes.remove(scene)
+    for part in parts:
+        bpy.data.meshes.remove(part.data)
+    bpy.data.collections.remove(others)
+    return vertices, triangles
+
+
+def _read_simulated(body, obj, parts, depsgraph, scale, time_scale):
     """Sets what the simulation has of a rigid body. Its shape is of the mesh before modifiers, unless its source is the
-    final one."""
+    final one; a compound shape is that of its parts."""
     rigid = obj.rigid_body
     of = obj.evaluated_get(depsgraph) if rigid.mesh_source == 'FINAL' else obj
     vertices, triangles = _surface(of)
     body.friction = rigid.friction
     body.hints = list(_hints(obj, vertices, _surface(obj.evaluated_get(depsgraph))[0]))
-    if rigid.collision_shape != 'COMPOUND':
+    if parts:
+        vertices, triangles = _concatenated(parts)
+        body.collider = scale * vertices[triangles]
+    elif rigid.collision_shape != 'COMPOUND':
         own_scale = numpy.linalg.norm(numpy.asarray(obj.matrix_world, float)[:3, :3], axis=0)
         body.collider, rounding = shapes.collider(rigid, vertices, triangles, own_scale)
         body.rounding = scale * rounding
@@ -175,18 +218,20 @@ def read(obj, scene, depsgraph, moves, simulated):
     back = numpy.eye(4)
     back[:3, :3] = rotation(obj.matrix_world).T
     back[:3, 3] = -back[:3, :3] @ numpy.asarray(obj.matrix_world, float)[:3, 3]
-    parts = [obj] + [child for child in obj.children_recursive if child.type == 'MESH' and is_part(child)]
-    if len(parts) > 1:
-        parts = parts[1:]  # a compound shape is that of its children
-    vertices, triangles = zip(*(_placed(part, depsgraph, back) for part in parts))
-    first = numpy.cumsum([0, *map(len, vertices)])
-    body = Body(obj.name, scale * numpy.concatenate(vertices),
-                numpy.concatenate([part + at for part, at in zip(triangles, first)]), settings.guessed_material(obj))
+    children = [child for child in obj.children_recursive if child.type == 'MESH' and is_part(child)]
+    parts = [_placed(child, depsgraph, back) for child in children]
+    heard = [_placed(obj, depsgraph, back)]
+    heard += [part for child, part in zip(children, parts) if child.carillon.material != "none"]
+    heard = [(vertices, triangles) for vertices, triangles in heard if len(triangles)] or heard[:1]
+    material = settings.guessed_material(obj)
+    sounds = (obj.carillon.material or material) not in ("", "none")
+    vertices, triangles = _united(heard) if sounds and len(heard) > 1 else _concatenated(heard)
+    body = Body(obj.name, scale * vertices, triangles, material)
     if not len(body.triangles):
         raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", [obj.name])
     rigid = obj.rigid_body
     if rigid and simulated:
-        _read_simulated(body, obj, depsgraph, scale, scene.rigidbody_world.time_scale)
+        _read_simulated(body, obj, parts, depsgraph, scale, scene.rigidbody_world.time_scale)
     if not body.mass:
         body.driven = moves and (simulated or obj.carillon.material == "none")
     return body

@@ -54,6 +54,7 @@ def _add_body(add, seen, obj):
     for part in [obj, *(child for child in obj.children_recursive if bodies.is_part(child))]:
         if part is not obj:
             _add_place(add, part)
+            add(part.carillon.material == "none")
         if part.type == 'MESH':
             points = numpy.empty(3 * len(part.data.vertices), numpy.float32)
             part.data.vertices.foreach_get("co", points)

@@ -21,6 +21,9 @@ FEW = 10
 ADVICE = {
     "SURFACE_OPEN": "the surface is not closed: close the mesh, or tick Repair in the physics properties, or give it "
                     "the material none",
+    "MESH_SEVERAL_PIECES": "its surface has parts that do not touch: let them overlap by a millimetre, and unite them by "
+                           "a Boolean modifier (the parts of a Compound Parent are united by the bake), give those that "
+                           "are only there to collide the material none, or separate them into bodies of their own",
     "NO_MODE_IN_BAND": "too small or too stiff to be heard: nothing else has a material, so that nothing sounds",
     "NO_MOTION": "nothing that takes part moves: give what moves a rigid body or a material",
 }

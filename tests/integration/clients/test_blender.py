@@ -132,6 +132,14 @@ class BlenderTest(unittest.TestCase):
         left, right = numpy.abs(samples[cut + sound.RATE // 20:cut + sound.RATE // 10]).max(axis=0)
         self.assertLess(left, 0.05 * right)
 
+    def test_the_parts_of_a_compound_are_united_but_for_those_that_only_collide(self):
+        top, leg = 0.5 * 0.5 * 0.03, 0.04 * 0.04 * 0.4
+        for case, volume in (("compound", top + 2 * leg - 0.04 * 0.04 * 0.015), ("compound of none", top)):
+            body = self.found[case]
+            self.assertAlmostEqual(body["volume"], volume, delta=1e-4 * volume)
+            # One closed surface without a handle.
+            self.assertEqual((body["closed"], body["euler"], body["collided"]), (True, 2, 24), case)
+
     def test_the_report_names_sound_without_radiation(self):
         self.assertIn("Radiation", self.found["usual"]["report"])
         self.assertNotIn("Radiation", self.found["keyed"]["report"])

@@ -11,12 +11,13 @@ import sys
 
 import bmesh
 import bpy
+import numpy
 
 ADDONS, FOLDER = sys.argv[sys.argv.index("--") + 1:]
 FOLDER = pathlib.Path(FOLDER)
 sys.path.insert(0, ADDONS)
 import carillon_blender  # noqa: E402
-from carillon_blender import freshness, programs, rebake  # noqa: E402
+from carillon_blender import bodies, freshness, programs, rebake  # noqa: E402
 
 carillon_blender.register()
 found = {}
@@ -204,11 +205,39 @@ def keyed():
     found["still"] = bake(scene)
 
 
+def compound():
+    """A top with two legs, one of which just touches it, and the other ends inside of it."""
+    scene = empty_scene("compound", 24)
+    bpy.ops.rigidbody.world_add()
+    top = add("Top", 'ACTIVE', (0, 0, 0.8), (0.5, 0.5, 0.03))
+    bpy.ops.object.transform_apply(location=False, rotation=False)
+    top.rigid_body.collision_shape, top.carillon.material = 'COMPOUND', "oak"
+    for name, x, height in (("Touches", -0.2, -0.215), ("Inside", 0.2, -0.2)):
+        leg = add(name, 'ACTIVE', (x, 0.2, height), (0.04, 0.04, 0.4))
+        bpy.ops.object.transform_apply(location=False, rotation=False)
+        leg.parent = top
+    top.rotation_euler = (0.3, 0.1, 0)
+
+    def read():
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        body = bodies.read(top, scene, depsgraph, True, True)
+        edges = numpy.sort(body.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        volume = float(numpy.linalg.det(body.vertices[body.triangles]).sum() / 6)
+        closed = bool((numpy.unique(edges, axis=0, return_counts=True)[1] == 2).all())
+        return {"volume": volume, "closed": closed, "euler": len(body.vertices) - len(body.triangles) // 2,
+                "collided": len(body.collider)}
+
+    found["compound"] = read()
+    bpy.data.objects["Inside"].carillon.material = bpy.data.objects["Touches"].carillon.material = "none"
+    found["compound of none"] = read()
+
+
 programs.materials()
 fall_scene, fall_bar = fall()
 freshness_of(fall_scene, fall_bar)
 failures(fall_scene, fall_bar)
 keyed()
 usual()
+compound()
 carillon_blender.unregister()
 (FOLDER / "bakes.json").write_text(json.dumps(found))
