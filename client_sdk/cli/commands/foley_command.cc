@@ -38,6 +38,8 @@ constexpr double kDeep = 0.1;
 constexpr double kSunk = 0.1;
 /// Bodies that strike each other are less than this part of the smaller one's radius apart.
 constexpr double kApart = 0.5;
+/// A body that strikes something is at most so many times as long as its way.
+constexpr double kMostOfTravel = 10;
 /// Shares of unexplained momentum from which the masses or shapes are doubtful, and from which the
 /// contacts are wrong (docs/motion.md).
 constexpr double kDoubtful = 0.001, kWrong = 0.03;
@@ -159,15 +161,27 @@ absl::Status CheckFall(const motion::Motion& motion, const FoleyOptions& options
   return absl::OkStatus();
 }
 
+/// Returns how far a body gets from its first place, m.
+double TravelOf(const MovingBody& body) {
+  double travel_m = 0;
+  for (const motion::BodyPose& pose : body.poses) {
+    travel_m = std::max(travel_m, (pose.position_m - body.poses.front().position_m).norm());
+  }
+  return travel_m;
+}
+
 /// Returns by which factor all meshes would have to be larger for contacts to explain the motion
 /// best, or 1 if none lets them explain it.
 double FindMeshFactor(const FoleyScene& foley, const motion::FoundContacts& found) {
   // Bodies that are drawn too small never meet where they strike.
   const bool may_be_small = found.confidence.sunk_part <= kSunk &&
                             (found.blows.empty() || found.confidence.apart_part > kApart);
+  const MovingBody& worst = foley.scene.motion.bodies[found.confidence.worst_body];
   double best = 1, least = kWrong;
   for (const double factor : {0.01, 0.001, 100.0, 1000.0}) {
-    if (factor > 1 && !may_be_small) continue;
+    // A ball of 100 m reaches any floor.
+    const bool is_huge = factor * SidesOf(worst).maxCoeff() > kMostOfTravel * TravelOf(worst);
+    if (factor > 1 && (!may_be_small || is_huge)) continue;
     motion::Motion scaled = foley.scene.motion;
     for (size_t i = 0; i < scaled.bodies.size(); ++i) {
       if (!foley.bodies[i].endless) ScaleShape(factor, scaled.bodies[i]);
