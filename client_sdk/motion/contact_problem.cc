@@ -38,16 +38,21 @@ double Varied(const Candidate& candidate, int variant) {
 }  // namespace
 
 ContactProblem::ContactProblem(const Motion& motion, const SearchBodies& bodies,
-                               const ContactSearch& search, std::vector<Candidate> candidates)
+                               const ContactSearch& search, std::vector<Candidate> candidates,
+                               const std::vector<HopSeries>& series)
     : frames_(motion.frame_count()),
       frame_s_(motion.frame_s),
       bins_(static_cast<size_t>(search.bin_count())),
       pairs_(search.pairs()),
       candidates_(std::move(candidates)),
+      given_(bodies.motions.size(), std::vector<std::vector<BodyImpulse>>(frames_ - 1)),
       blows_of_pair_(search.pairs().size()),
       loads_of_pair_(search.pairs().size()),
       balance_(bodies.motions.size(), motion.frame_count()) {
   for (const BodyMotion& body : bodies.motions) balanced_.push_back(body.balanced());
+  for (const HopSeries& of : series) {
+    for (const FoundBlow& blow : of.blows) AddGiven(bodies, blow);
+  }
   AddNodes(motion, bodies, search);
   for (size_t i = 0; i < candidates_.size(); ++i) {
     AddUnknown(candidates_[i]);
@@ -66,9 +71,27 @@ void ContactProblem::AddNodes(const Motion& motion, const SearchBodies& bodies,
     if (!moves.balanced()) continue;
     for (size_t k = 1; k + 1 < motion.frame_count(); ++k) {
       if (search.Skipped(body, k)) continue;
-      balance_.AddNode(body, k, moves.mass_kg(), moves.InverseInertia(k), moves.Impulse(k),
-                       moves.Torque(k));
+      Vector impulse = moves.Impulse(k), torque = moves.Torque(k);
+      for (const size_t interval : {k - 1, k}) {
+        for (const BodyImpulse& given : given_[body][interval]) {
+          const double share = given.time_s / frame_s_, part = interval == k ? 1 - share : share;
+          impulse -= part * given.impulse;
+          torque -= part * given.torque;
+        }
+      }
+      balance_.AddNode(body, k, moves.mass_kg(), moves.InverseInertia(k), impulse, torque);
     }
+  }
+}
+
+void ContactProblem::AddGiven(const SearchBodies& bodies, const FoundBlow& blow) {
+  for (const uint32_t body : {blow.a, blow.b}) {
+    if (!balanced_[body]) continue;
+    const BodyMotion& moves = bodies.motions[body];
+    const Vector impulse = (body == blow.a ? 1 : -1) * blow.impulse_newton_seconds;
+    const Vector arm = moves.At(blow.frame, blow.time_s, Path::kKnown).orientation *
+                       ((body == blow.a ? blow.point_a_m : blow.point_b_m) - moves.centre_m());
+    given_[body][blow.frame].push_back({blow.time_s, impulse, arm.cross(impulse)});
   }
 }
 
@@ -275,8 +298,7 @@ std::vector<double> ContactProblem::BlowTimes() const {
 
 void ContactProblem::Tell(std::vector<BodyMotion>& motions) const {
   const std::vector<double> times = BlowTimes();
-  std::vector<std::vector<std::vector<BodyImpulse>>> impulses(
-      motions.size(), std::vector<std::vector<BodyImpulse>>(frames_ - 1));
+  std::vector<std::vector<std::vector<BodyImpulse>>> impulses = given_;
   std::vector<std::vector<Vector>> forces(motions.size(),
                                           std::vector<Vector>(frames_, Vector::Zero()));
   for (size_t i = 0; i < candidates_.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "client_sdk/motion/contact_search.h"
+#include "client_sdk/motion/hop_series.h"
 #include "client_sdk/motion/momentum_balance.h"
 
 namespace carillon::motion {
@@ -15,8 +16,9 @@ inline constexpr double kBinsAtOnce = 2.5;
 /// The balance of a motion with one unknown for each candidate, and how it is solved.
 class ContactProblem {
  public:
+  /// The blows of `series` are taken as they are.
   ContactProblem(const Motion& motion, const SearchBodies& bodies, const ContactSearch& search,
-                 std::vector<Candidate> candidates);
+                 std::vector<Candidate> candidates, const std::vector<HopSeries>& series);
 
   /// Solves, removes the bias of the costs, and joins impulses that cannot be told apart. With a
   /// `variant` above zero each cost is multiplied by a number of its own from 1/2 to 2, and
@@ -39,6 +41,7 @@ class ContactProblem {
     std::vector<Vector> before;   ///< their values
   };
   void AddNodes(const Motion& motion, const SearchBodies& bodies, const ContactSearch& search);
+  void AddGiven(const SearchBodies& bodies, const FoundBlow& blow);
   void AddUnknown(const Candidate& candidate);
   void AddJoints(const Motion& motion, const SearchBodies& bodies);
   size_t BinOf(const Candidate& candidate) const;
@@ -53,6 +56,8 @@ class ContactProblem {
   size_t bins_;
   const std::vector<BodyPair>& pairs_;
   std::vector<Candidate> candidates_;
+  std::vector<std::vector<std::vector<BodyImpulse>>>
+      given_;  ///< by series, for each body and interval
   std::vector<std::vector<size_t>> blows_of_pair_, loads_of_pair_;
   std::vector<bool> balanced_;
   MomentumBalance balance_;

@@ -355,7 +355,8 @@ Confidence ReadConfidence(const Motion& motion, const SearchBodies& bodies,
 }  // namespace
 
 FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
-                           const ContactSearch& search, const ContactProblem& problem) {
+                           const ContactSearch& search, const ContactProblem& problem,
+                           const std::vector<HopSeries>& series) {
   FoundContacts found;
   std::vector<PairReading> readings;
   const double bin_s = motion.frame_s / search.bin_count();
@@ -366,6 +367,9 @@ FoundContacts ReadContacts(const Motion& motion, const SearchBodies& bodies,
     readings[candidate.pair].Add(candidate, problem.TimeOf(candidate), problem.value(i));
   }
   for (PairReading& reading : readings) reading.Read(found);
+  for (const HopSeries& of : series) {
+    found.blows.insert(found.blows.end(), of.blows.begin(), of.blows.end());
+  }
   const auto time = [&](const FoundBlow& blow) {
     return static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
   };
@@ -384,6 +388,7 @@ void SetApproaches(const Motion& motion, const SearchBodies& bodies, double bin_
     };
     blow.orientation_a = orientation(blow.a);
     blow.orientation_b = orientation(blow.b);
+    if (blow.approach_m_per_s > 0) continue;  // It is known from the series.
     const double time_s = blow.SinceFirst(motion.frame_s);
     double before_s = std::max(0.0, time_s - bin_s);
     for (size_t k = i; k-- > 0 && time_s - found.blows[k].SinceFirst(motion.frame_s) < 2 * bin_s;) {

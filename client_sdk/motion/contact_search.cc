@@ -18,6 +18,11 @@ constexpr double kStillSpeed = 0.002;
 /// The time between two blows that are told apart, s, as far as the frames allow.
 constexpr double kBinS = 0.004;
 
+/// The gap at rest is that of this number of frames at least.
+constexpr size_t kGaps = 3;
+/// A force is steady if it changes by less than this share from frame to frame.
+constexpr double kSteady = 0.1;
+
 double TolerancesOf(double a, double b) { return 0.01 * std::min(a, b); }
 
 /// Leaves one of the features that lie at one place, such as all corners of a sphere's core: the
@@ -170,17 +175,30 @@ void ContactSearch::FindAtFrames(size_t p, std::vector<PairFrame>& frames) const
 }
 
 /// Engines keep bodies apart by a margin, or let them overlap. The gap at rest is the least known.
+/// A body that hops is above it in most frames, so that gaps under a steady force count first.
 void ContactSearch::FindOffset(BodyPair& pair, const std::vector<PairFrame>& frames) const {
-  std::vector<double> gaps;
-  for (const PairFrame& frame : frames) {
+  const auto is_steady = [&](uint32_t body, size_t k) {
+    const BodyMotion& moves = bodies_.motions[body];
+    if (!moves.balanced()) return true;
+    const Vector before = moves.Impulse(k - 1), here = moves.Impulse(k),
+                 after = moves.Impulse(k + 1);
+    const double most = kSteady * here.norm();
+    return (here - before).norm() < most && (here - after).norm() < most;
+  };
+  std::vector<double> gaps, steady_gaps;
+  for (size_t k = 0; k < frames_; ++k) {
+    const PairFrame& frame = frames[k];
     if (frame.features.empty()) continue;
     const double gap = std::ranges::min_element(frame.features, {}, &ContactFeature::gap_m)->gap_m;
     pair.nearest_m = std::min(pair.nearest_m, gap);
-    if (frame.slack_m < 3 * pair.tolerance_m && std::abs(gap) < 5 * pair.tolerance_m) {
-      gaps.push_back(gap);
+    if (frame.slack_m >= 3 * pair.tolerance_m || std::abs(gap) >= 5 * pair.tolerance_m) continue;
+    gaps.push_back(gap);
+    if (k > 1 && k + 2 < frames_ && is_steady(pair.a, k) && is_steady(pair.b, k)) {
+      steady_gaps.push_back(gap);
     }
   }
-  if (gaps.size() < 3) return;
+  if (steady_gaps.size() >= kGaps) gaps = std::move(steady_gaps);
+  if (gaps.size() < kGaps) return;
   std::ranges::nth_element(gaps, gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 2));
   pair.offset_m = gaps[gaps.size() / 2];
 }

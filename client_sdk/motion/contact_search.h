@@ -54,6 +54,12 @@ class ContactSearch {
   /// contacts found before.
   std::vector<Candidate> Find(bool known);
 
+  /// Where a pair's bodies are at a time in an interval, and where they may touch if they are
+  /// there.
+  PairPlacement Place(const BodyPair& pair, size_t interval, double time_s, Path path) const;
+  std::vector<ContactFeature> Features(const BodyPair& pair, const PairPlacement& at,
+                                       double reach_m) const;
+
   int bin_count() const { return bin_count_; }
   const std::vector<BodyPair>& pairs() const { return pairs_; }
   /// True if the balance of a node need not be looked at: the frames around it are the same.
@@ -71,9 +77,6 @@ class ContactSearch {
   void FindPairs();
   bool Near(const BodyPair& pair, size_t frame, double margin_m) const;
   double Slack(const BodyPair& pair, size_t interval) const;
-  std::vector<ContactFeature> Features(const BodyPair& pair, const PairPlacement& at,
-                                       double reach_m) const;
-  PairPlacement Place(const BodyPair& pair, size_t interval, double time_s, Path path) const;
   bool Still(size_t body, size_t frame) const;
   bool Acts(size_t body, size_t node) const;
   void FindAtFrames(size_t pair, std::vector<PairFrame>& frames) const;

@@ -12,6 +12,7 @@
 #include "client_sdk/motion/contact_reading.h"
 #include "client_sdk/motion/contact_search.h"
 #include "client_sdk/motion/free_fall.h"
+#include "client_sdk/motion/hop_series.h"
 #include "client_sdk/motion/in_parallel.h"
 #include "proto/cpp/error_reason.h"
 #include "proto/cpp/status_macros.h"
@@ -215,17 +216,25 @@ absl::StatusOr<FoundContacts> FindContacts(const Motion& motion, bool even_if_co
   if (!even_if_coarse) RETURN_IF_ERROR(CheckTurns(motion, *bodies));
   ContactSearch search(motion, *bodies);
   std::unique_ptr<ContactProblem> problem;
+  std::vector<HopSeries> series;
   for (int pass = 0; pass < kPasses; ++pass) {
-    problem = std::make_unique<ContactProblem>(motion, *bodies, search, search.Find(pass > 0));
+    std::vector<Candidate> candidates = search.Find(pass > 0);
+    RemoveHops(motion, search.bin_count(), series, candidates);
+    problem =
+        std::make_unique<ContactProblem>(motion, *bodies, search, std::move(candidates), series);
     problem->Solve();
     if (pass + 1 < kPasses) problem->Tell(bodies->motions);
+    if (pass == 0) {
+      series =
+          FindHops(motion, *bodies, search, ReadContacts(motion, *bodies, search, *problem, {}));
+    }
   }
-  FoundContacts found = ReadContacts(motion, *bodies, search, *problem);
+  FoundContacts found = ReadContacts(motion, *bodies, search, *problem, series);
   std::vector<FoundContacts> others(kVariants);
   InParallel(others.size(), [&](size_t i) {
-    ContactProblem varied(motion, *bodies, search, problem->candidates());
+    ContactProblem varied(motion, *bodies, search, problem->candidates(), series);
     varied.Solve(static_cast<int>(i) + 1);
-    others[i] = ReadContacts(motion, *bodies, search, varied);
+    others[i] = ReadContacts(motion, *bodies, search, varied, series);
   });
   SetAmbiguity(found, others, motion.frame_s);
   RefineBlows(motion, search.pairs(), *bodies, found);
