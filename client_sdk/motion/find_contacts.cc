@@ -54,8 +54,9 @@ absl::Status CheckBody(const MovingBody& body, size_t frames) {
 absl::Status Check(const Motion& motion) {
   const size_t frames = motion.frame_count();
   if (frames < 4) {
-    return Refused("NO_MOTION", absl::StrCat("the motion has ", frames,
-                                             " frames, and impulses need four at least"));
+    return Refused("NO_MOTION", frames < 2 ? std::string("no body moves")
+                                           : absl::StrCat("the motion has ", frames,
+                                                          " frames, and impulses need four"));
   }
   if (!(motion.frame_s > 0) || !motion.gravity_m_per_s2.allFinite()) {
     return Refused("MOTION_MALFORMED", "the time of a frame must be above zero, gravity finite");

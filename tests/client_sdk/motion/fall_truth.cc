@@ -3,17 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <set>
+#include <span>
 #include <utility>
 
 namespace carillon::motion {
 namespace {
 
 using Key = std::pair<uint32_t, uint32_t>;
-constexpr double kTogetherS = 0.008, kLeastShare = 0.03, kLeastSpeed = 0.02;
+constexpr double kOneContactS = 0.001, kTogetherS = 0.008, kLeastShare = 0.03, kLeastSpeed = 0.02;
 
 /// One step of one pair.
 struct StepImpulse {
@@ -89,6 +90,43 @@ void Round(BodyPose& pose) {
     pose.orientation.coeffs()[i] = static_cast<float>(pose.orientation.coeffs()[i]);
 }
 
+/// Takes blows of one pair together that follow each other within `within_s`.
+std::vector<PairBlow> Together(const std::vector<PairBlow>& blows, double within_s) {
+  std::vector<PairBlow> groups;
+  double last_s = 0;
+  for (const PairBlow& blow : blows) {
+    if (groups.empty() || blow.time_s - std::exchange(last_s, blow.time_s) > within_s) {
+      groups.push_back(blow);
+      last_s = blow.time_s;
+      continue;
+    }
+    PairBlow& group = groups.back();
+    const double size = blow.impulse.norm(), share = size / (group.impulse.norm() + size);
+    group.time_s += share * (blow.time_s - group.time_s);
+    group.point_m += share * (blow.point_m - group.point_m);
+    group.impulse += blow.impulse;
+  }
+  return groups;
+}
+
+/// The impulse in each step of the load among `steps`. It is a mean, because a load of MuJoCo comes
+/// and goes from step to step, but one without blows.
+double LoadOf(std::span<const StepImpulse> steps) {
+  double load = std::numeric_limits<double>::infinity(), before = 0;
+  do {
+    before = load;
+    double sum = 0;
+    size_t count = 0;
+    for (const StepImpulse& step : steps) {
+      if (step.size > 3 * before) continue;
+      sum += step.size;
+      ++count;
+    }
+    load = count > 0 ? sum / static_cast<double>(count) : 0;
+  } while (load < before);
+  return load;
+}
+
 /// The contacts of a simulation, step by step.
 class TruthReader {
  public:
@@ -127,42 +165,28 @@ class TruthReader {
  private:
   void AddBlows(const Key& key, const std::vector<StepImpulse>& series, double step_s,
                 std::vector<PairBlow>& blows) const {
-    double last = -1, sum = 0, moment = 0;
-    PairBlow blow{.a = key.first, .b = key.second};
-    const double mass = ReducedMass(motion_, blow),
+    const double mass = ReducedMass(motion_, {.a = key.first, .b = key.second}),
                  least = mass * std::min(2 * 9.81 * step_s, kLeastSpeed);
     // Soft contacts last for tens of milliseconds.
     const auto around = static_cast<size_t>(0.06 / step_s);
-    const auto close = [&] {
-      if (sum > kLeastSpeed * mass) {
-        blow.time_s = moment / sum;
-        blow.point_m /= sum;
-        blows.push_back(blow);
-      }
-      blow = {.a = key.first, .b = key.second};
-      sum = moment = 0;
-    };
+    std::vector<PairBlow> steps;
     for (size_t i = 0; i < series.size(); ++i) {
-      std::vector<double> near;
-      for (size_t k = i > around ? i - around : 0; k <= std::min(series.size() - 1, i + around);
-           ++k) {
-        near.push_back(series[k].size);
-      }
-      std::ranges::nth_element(near, near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2));
-      // The mean is that of a load which comes and goes from step to step, as with MuJoCo.
-      const double mean =
-          std::accumulate(near.begin(), near.end(), 0.0) / static_cast<double>(near.size());
-      if (series[i].size < least + 3 * std::max(near[near.size() / 2], mean)) continue;
+      const auto& [impulse, moment, size] = series[i];
+      if (size <= least) continue;
+      const size_t first = i > around ? i - around : 0;
+      const auto near =
+          std::span(series).subspan(first).first(std::min(series.size(), i + around + 1) - first);
+      if (size < least + 3 * LoadOf(near)) continue;
       // An engine of half implicit steps applies an impulse at the beginning of its step.
-      const double time = static_cast<double>(i) * step_s;
-      if (sum > 0 && time - last > kTogetherS) close();
-      last = time;
-      sum += series[i].size;
-      moment += series[i].size * time;
-      blow.impulse += series[i].impulse;
-      blow.point_m += series[i].moment;
+      steps.push_back({.a = key.first,
+                       .b = key.second,
+                       .time_s = static_cast<double>(i) * step_s,
+                       .impulse = impulse,
+                       .point_m = moment / size});
     }
-    close();
+    for (const PairBlow& blow : Together(Together(steps, kOneContactS), kTogetherS)) {
+      if (blow.impulse.norm() > kLeastSpeed * mass) blows.push_back(blow);
+    }
   }
 
   const Motion& motion_;
@@ -239,27 +263,20 @@ Fall Drop(const falls::FallScene& scene, const Engine& engine, int steps_per_fra
 }
 
 std::vector<PairBlow> Clustered(const Motion& motion, const FoundContacts& found) {
-  std::map<Key, std::vector<std::pair<PairBlow, double>>> of_pair;
+  std::map<Key, std::vector<PairBlow>> of_pair;
   for (const FoundBlow& blow : found.blows) {
     const bool swapped = motion.bodies[blow.a].mass_kg == 0;
     const Key key = swapped ? Key{blow.b, blow.a} : Key{blow.a, blow.b};
-    const double time = static_cast<double>(blow.frame) * motion.frame_s + blow.time_s;
-    const Vector j = (swapped ? -1 : 1) * blow.impulse_newton_seconds;
-    auto& blows = of_pair[key];
-    if (blows.empty() || time - blows.back().second > kTogetherS) {
-      blows.push_back({{.a = key.first, .b = key.second}, time});
-    }
-    PairBlow& last = blows.back().first;
-    blows.back().second = time;
-    const double before = last.impulse.norm(), size = j.norm();
-    last.time_s = (before * last.time_s + size * time) / (before + size);
-    last.point_m = (before * last.point_m + size * (swapped ? blow.point_b_m : blow.point_a_m)) /
-                   (before + size);
-    last.impulse += j;
+    of_pair[key].push_back(
+        {.a = key.first,
+         .b = key.second,
+         .time_s = static_cast<double>(blow.frame) * motion.frame_s + blow.time_s,
+         .impulse = (swapped ? -1 : 1) * blow.impulse_newton_seconds,
+         .point_m = swapped ? blow.point_b_m : blow.point_a_m});
   }
   std::vector<PairBlow> all;
   for (const auto& [key, blows] : of_pair) {
-    for (const auto& [blow, last] : blows) all.push_back(blow);
+    for (const PairBlow& blow : Together(blows, kTogetherS)) all.push_back(blow);
   }
   std::ranges::sort(all, {}, &PairBlow::time_s);
   return all;
