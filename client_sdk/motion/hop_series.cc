@@ -29,6 +29,8 @@ constexpr double kCostOfHop = 0.01;
 constexpr double kCoarse = 0.005, kFine = 1e-6;
 /// The number of frames that tell a flight, and a rest.
 constexpr size_t kFlightFrames = 2, kRestFrames = 4;
+/// Hops that follow each other in so many frames are sure to be told apart by their momenta.
+constexpr double kAloneFrames = 2.5;
 /// A change of an impulse costs this share of the energy that it would explain.
 constexpr double kKeep = 0.01;
 
@@ -413,8 +415,8 @@ std::vector<HopSeries> FindHops(const Motion& motion, const SearchBodies& bodies
         });
       };
       if (follow_within(h) == hops.end()) continue;
-      // What follows in two frames may be found wrongly, too, for the sake of the faster hops.
-      hops.erase(hops.begin(), follow_within(2 * h));
+      // Hops that are not much slower may be found wrongly, too, for the sake of the faster ones.
+      hops.erase(hops.begin(), follow_within(kAloneFrames * h));
       const double first_s = hops.front().time_s - h;
       const double last_s = std::min(run.end_s, hops.back().time_s + h);
       if (TouchesOthers(found, hopper.body(), pair, h, first_s, last_s)) continue;

@@ -256,7 +256,7 @@ struct FoundHops {
 };
 FoundHops FindHopsOf(const falls::Body& body, double rest_m, double restitution,
                      double slides_m_per_s, int rate) {
-  constexpr double kCases[][2] = {{0.1, 0.4}, {0.2, 0.4}, {0.3, 0.4}, {1, 0}};
+  constexpr double kCases[][2] = {{0.1, 0.2}, {0.1, 0.4}, {0.3, 0.4}, {1, 0}};
   constexpr double kCount = std::size(kCases);
   FoundHops mean;
   for (const auto& [height_m, part] : kCases) {
