@@ -52,12 +52,30 @@ def is_free(obj):
     return body.type == 'ACTIVE' and body.enabled and (not body.kinematic or bool(keyed))
 
 
+def are_spheres(scene):
+    """True if all that the simulation moves are spheres, which touch a mesh without its margin."""
+    return all(obj.rigid_body.collision_shape == 'SPHERE' for obj in in_world(scene)
+               if is_free(obj) and not is_part(obj))
+
+
 def taking_part(scene):
     """The objects that are bodies: all rigid bodies, and others for which a material is chosen."""
     rigid = [obj for obj in in_world(scene) if not is_part(obj)]
     others = [obj for obj in scene.objects
               if obj.type == 'MESH' and obj.carillon.material and obj not in rigid and not is_part(obj)]
     return sorted(rigid + others, key=lambda obj: obj.name)
+
+
+def unheard(scene):
+    """Names of objects that have a material of Carillon and are no mesh -> what to do about it."""
+    found = {}
+    for obj in scene.objects:
+        shown = obj.instance_collection if obj.instance_type == 'COLLECTION' else None
+        if obj.type != 'MESH' and any(of.carillon.material not in ("", "none")
+                                      for of in (obj, *(shown.all_objects if shown else ()))):
+            remedy = "Apply > Make Instances Real" if shown else "Convert > Mesh"
+            found.setdefault(remedy, []).append(obj.name)
+    return {", ".join(names): f"no mesh, and not heard: choose Object > {remedy}" for remedy, names in found.items()}
 
 
 def check_scales(objects):
@@ -190,10 +208,10 @@ def _united(surfaces):
     return vertices, triangles
 
 
-def _read_simulated(body, obj, parts, depsgraph, scale, time_scale):
+def _read_simulated(body, obj, parts, depsgraph, scene):
     """Sets what the simulation has of a rigid body. Its shape is of the mesh before modifiers, unless its source is the
     final one; a compound shape is that of its parts."""
-    rigid = obj.rigid_body
+    rigid, scale, time_scale = obj.rigid_body, settings.metres_per_unit(scene), scene.rigidbody_world.time_scale
     of = obj.evaluated_get(depsgraph) if rigid.mesh_source == 'FINAL' else obj
     vertices, triangles = _surface(of)
     body.friction = rigid.friction
@@ -204,7 +222,7 @@ def _read_simulated(body, obj, parts, depsgraph, scale, time_scale):
     elif rigid.collision_shape != 'COMPOUND':
         own_scale = numpy.linalg.norm(numpy.asarray(obj.matrix_world, float)[:3, :3], axis=0)
         body.collider, rounding = shapes.collider(rigid, vertices, triangles, own_scale)
-        body.rounding = scale * rounding
+        body.rounding = 0 if rigid.collision_shape == 'MESH' and are_spheres(scene) else scale * rounding
         body.collider = None if body.collider is None else scale * body.collider
     if is_free(obj):
         body.mass = rigid.mass
@@ -231,7 +249,7 @@ def read(obj, scene, depsgraph, moves, simulated):
         raise Fault("BODY_WITHOUT_SURFACE", f"{obj.name} has no face: give it a mesh, or no rigid body", [obj.name])
     rigid = obj.rigid_body
     if rigid and simulated:
-        _read_simulated(body, obj, parts, depsgraph, scale, scene.rigidbody_world.time_scale)
+        _read_simulated(body, obj, parts, depsgraph, scene)
     if not body.mass:
         body.driven = moves and (simulated or obj.carillon.material == "none")
     return body

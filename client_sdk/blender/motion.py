@@ -44,7 +44,8 @@ def read(scene, tell):
                                      "and New alike")
     objects = bodies.taking_part(scene)
     if not objects:
-        raise Fault("NO_BODY", world_is_off(scene) or
+        unheard = "; ".join(f"{names}: {why}" for names, why in bodies.unheard(scene).items())
+        raise Fault("NO_BODY", world_is_off(scene) or unheard or
                     f"{scene.name} has no rigid body, and no object has a material of Carillon: give the "
                     "objects that sound a material, and their floor the material none")
     bodies.check_scales(objects)

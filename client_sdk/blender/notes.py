@@ -32,6 +32,7 @@ def of(scene, found):
         if not material:
             silent.append(f'{body.name} (no material has the name of its Blender material, "{slots[0]}")' if slots
                           else body.name)
+    lines += [f"warning: {names}: {why}" for names, why in bodies.unheard(scene).items()]
     if silent:
         lines.append("Silent, without a material: " + ", ".join(silent))
     return lines + [f"warning: {one} and {other} overlap in the first frame: what pushes them apart is heard as blows"

@@ -10,7 +10,7 @@ import subprocess
 
 import bpy
 
-from . import motion, notes, programs, settings, shapes
+from . import bodies, motion, notes, programs, settings, shapes
 from .programs import Fault
 
 MARK = "carillon-bake: "
@@ -73,8 +73,9 @@ def _check_materials(found):
         missing = ", ".join(f"{name}: no material has the name {chosen[name]}" for name in unknown)
         raise Fault("UNKNOWN_MATERIAL", f"{missing}: choose one of the list", unknown)
     if not any(material not in ("", "none") for material in chosen.values()):
-        raise Fault("NO_MATERIAL", "no object has a material of Carillon: choose one in Physics properties > Carillon, "
-                                   "or give the object a Blender material of that name")
+        unheard = "; ".join(f"{names}: {why}" for names, why in bodies.unheard(bpy.context.scene).items())
+        raise Fault("NO_MATERIAL", unheard or "no object has a material of Carillon: choose one in Physics properties > "
+                                              "Carillon, or give the object a Blender material of that name")
 
 
 def _causes(scene, found, name, reason):
@@ -88,6 +89,15 @@ def _causes(scene, found, name, reason):
         if obj.name == name and obj.rigid_body and shapes.is_thinner_than_margin(obj.rigid_body, obj.dimensions):
             causes.append("it is thinner than the margin of 4 cm that the simulator gives it: tick Rigid Body > "
                           "Sensitivity > Collision Margin, and set 0.001 m")
+        if obj.name == name and obj.rigid_body and obj.rigid_body.collision_shape == 'SPHERE' and (
+                not bodies.are_spheres(scene)):
+            meshes = [of.name for of in bodies.in_world(scene) if of.rigid_body.collision_shape == 'MESH' and
+                      not (of.rigid_body.use_margin and of.rigid_body.collision_margin == 0)]
+            if meshes:
+                causes.append(f"spheres touch {', '.join(meshes)}, of the shape Mesh, without the margin that other "
+                              "shapes keep: tick Rigid Body > Sensitivity > Collision Margin there, and set 0")
+        if obj.field and obj.field.type != 'NONE':
+            causes.append(f"{obj.name}, a force field, moves it, which is not heard yet")
     size = sum(g * g for g in _gravity(scene)) ** 0.5
     if scene.use_gravity and not 3 < size < 30:
         causes.append(f"gravity is {size:.3g} m/s^2: see Scene > Gravity, and Units > Unit Scale")
@@ -101,7 +111,8 @@ def _causes(scene, found, name, reason):
                       "as bodies fall: keep it still or let it fall from the first frame on, or split the scene")
     if reason == "MOTION_WITHOUT_CONTACT" and not causes:
         causes.append("if a floor without a rigid body is there, give it the material none")
-    return "; ".join(causes or ["something else than contacts and gravity moves it, such as a force field"])
+    return "; ".join(causes or ["the shapes or the steps of the simulator may be too coarse: raise Rigid Body World > "
+                                "Substeps Per Frame, or set Rigid Body > Sensitivity > Collision Margin to 0.001 m"])
 
 
 def _in_blender(text, found):

@@ -105,6 +105,9 @@ class BlenderTest(unittest.TestCase):
             self.assertEqual(refused["result"], ["CANCELLED"], case)
             self.assertTrue(refused["fault"].startswith(reason + ": "), refused)
             self.assertEqual(list(refused["faults"]), [body] if body else [], case)
+        self.assertNotIn("Letter", self.found["refused"]["no material"]["fault"])
+        self.assertRegex(self.found["refused"]["no mesh"]["fault"], "^NO_MATERIAL: Letter: ")
+        self.assertRegex(self.found["usual"]["report"], "(?m)^warning: Letter: ")
         self.assertEqual(self.found["strips after refusals"], self.found["strips"])
         self.assertTrue(self.found["still"]["fault"].startswith("NO_MOTION: "), self.found["still"])
 
@@ -139,6 +142,9 @@ class BlenderTest(unittest.TestCase):
             self.assertAlmostEqual(body["volume"], volume, delta=1e-4 * volume)
             # One closed surface without a handle.
             self.assertEqual((body["closed"], body["euler"], body["collided"]), (True, 2, 24), case)
+
+    def test_spheres_touch_meshes_without_the_margin_of_the_simulator(self):
+        self.assertEqual(self.found["margins"], [0, 0.04])
 
     def test_the_report_names_sound_without_radiation(self):
         self.assertIn("Radiation", self.found["usual"]["report"])

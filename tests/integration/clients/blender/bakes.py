@@ -134,6 +134,9 @@ def failures(scene, bar):
     refused["open"] = bake(scene)
     bar.carillon.material = ""
     refused["no material"] = bake(scene)
+    bpy.ops.object.text_add()
+    bpy.context.object.name, bpy.context.object.carillon.material = "Letter", "brass"
+    refused["no mesh"] = bake(scene)
     bar.carillon.material = "structural_steel"
     bar.scale.x *= -1
     refused["negative scale"] = bake(scene)
@@ -232,6 +235,22 @@ def compound():
     found["compound of none"] = read()
 
 
+def margins():
+    """The margin of a shape Mesh while the simulation moves spheres alone, and then a box, too."""
+    scene = empty_scene("margins", 24)
+    bpy.ops.rigidbody.world_add()
+    ground = add("Ground", 'PASSIVE', (0, 0, -0.1), (2, 2, 0.2))
+    ground.rigid_body.collision_shape = 'MESH'
+    add("Marble", 'ACTIVE', (0, 0, 1), (0.1, 0.1, 0.1)).rigid_body.collision_shape = 'SPHERE'
+
+    def rounding():
+        return bodies.read(ground, scene, bpy.context.evaluated_depsgraph_get(), False, True).rounding
+
+    found["margins"] = [rounding()]
+    add("Die", 'ACTIVE', (0.5, 0, 1), (0.1, 0.1, 0.1))
+    found["margins"].append(rounding())
+
+
 programs.materials()
 fall_scene, fall_bar = fall()
 freshness_of(fall_scene, fall_bar)
@@ -239,5 +258,6 @@ failures(fall_scene, fall_bar)
 keyed()
 usual()
 compound()
+margins()
 carillon_blender.unregister()
 (FOLDER / "bakes.json").write_text(json.dumps(found))
