@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 'use strict';
 
-// Prints the messages of an MCAP file, each with its topic, the name of its schema, and its time in nanoseconds.
+// Prints the metadata of an MCAP file, and its messages, each with its topic, the name of its schema, and its time in
+// nanoseconds.
 const fs = require('node:fs');
 const { McapIndexedReader } = require('@mcap/core');
 
@@ -11,6 +12,7 @@ async function main(path) {
     read: async (offset, size) => bytes.subarray(Number(offset), Number(offset + size)) };
   const reader = await McapIndexedReader.Initialize({ readable });
   const messages = [];
+  for await (const { metadata } of reader.readMetadata()) messages.push(Object.fromEntries(metadata));
   for await (const { channelId, logTime, data } of reader.readMessages({ validateCrcs: true })) {
     const { topic, schemaId, messageEncoding } = reader.channelsById.get(channelId);
     const { name, encoding, data: schema } = reader.schemasById.get(schemaId);

@@ -102,13 +102,17 @@ class RecipesTest(DaemonTest):
         (modules / "carillon").symlink_to(ROOT / "client_sdk/node")
         path = (modules, os.environ["CARILLON_NODE_MODULES"])
         self.run_well("node", "mcap.js", "drop.contacts", "drop.mcap", "1764417600", path=path)
-        messages = json.loads(self.run_well("node", pathlib.Path(__file__).with_name("read_mcap.js"), "drop.mcap",
-                                            path=path))
+        metadata, *messages = json.loads(self.run_well(
+            "node", pathlib.Path(__file__).with_name("read_mcap.js"), "drop.mcap", path=path))
         audio = [message for message in messages if message["topic"] == "/sound"]
         (impact,) = (message for message in messages if message["topic"] == "/impacts")
         self.assertEqual({message["schema"] for message in audio}, {"foxglove.RawAudio"})
-        levels = [numpy.frombuffer(base64.b64decode(message["data"]), "<i2") / 32767 for message in audio]
-        numpy.testing.assert_allclose(numpy.concatenate(levels), heard.mono, rtol=0, atol=0.51 / 32767)
+        levels = numpy.concatenate([numpy.frombuffer(base64.b64decode(message["data"]), "<i2") for message in audio])
+        self.assertEqual(numpy.abs(levels).max(), 32767)  # however quiet it is
+        lsb_pa = float(metadata["full_scale_pa"]) / 32767
+        self.assertAlmostEqual(32767 * lsb_pa, heard.summary.peak_pa, delta=1e-6 * heard.summary.peak_pa)
+        numpy.testing.assert_allclose(levels * lsb_pa, heard.mono * heard.summary.full_scale_pa, rtol=0,
+                                      atol=0.51 * lsb_pa)
         self.assertEqual({(message["format"], message["sample_rate"], message["number_of_channels"])
                           for message in audio}, {("pcm-s16", 48000, 1)})
         for number, message in enumerate(audio):
@@ -122,7 +126,9 @@ class RecipesTest(DaemonTest):
         self.assertAlmostEqual(impact["duration_s"], 0.0005, places=8)
 
     def test_sampler(self):
-        self.run_python("recipe_sampler.md")
+        program = self.folder / self.save("recipe_sampler.md", "python", "sampler.py")
+        program.write_text(program.read_text().replace("-0.2 *", "-1e-4 *"))  # as if the bar were quieter by 66 dB
+        self.run_well("/usr/bin/python3", program)
         regions = re.findall(r"sample=(\S+) .*pitch_keycenter=(\d+) lovel=(\d+)", (self.folder / "bar.sfz").read_text())
         self.assertEqual(len(regions), 21)
         treble = {}
@@ -130,6 +136,7 @@ class RecipesTest(DaemonTest):
             heard = sound.read_wave(self.folder / file)[:48000, 0]
             spectrum = numpy.abs(numpy.fft.rfft(heard * numpy.hanning(len(heard))))  # a line is a hertz
             lowest = int(spectrum[:int(1.5 * 440 * 2**((int(key) - 69) / 12))].argmax())
+            self.assertGreater(numpy.abs(heard).max(), 0.19)
             self.assertAlmostEqual(lowest, 440 * 2**((int(key) - 69) / 12), delta=1.1, msg=file)
             treble[key, velocity] = (spectrum[2 * lowest:]**2).sum() / (spectrum**2).sum()
         for key in {key for _, key, _ in regions}:
