@@ -197,8 +197,9 @@ absl::StatusOr<NpyArray> ParseNpy(const std::string& name, std::string_view file
   const uint64_t item = ItemBytes(array.type);
   if (item == 0) {
     return BadArray(name, absl::StrCat("holds '", array.type,
-                                       "', of which nothing is read; store floats as "
-                                       "'<f4' or '<f8', indices as '<u4', '<i4', '<u8' or '<i8'"));
+                                       "', of which nothing is read; store floats as '<f4' or "
+                                       "'<f8', indices as '<u4', '<i4', '<u8' or '<i8', and text "
+                                       "as '<U' or '|S'"));
   }
   const std::string_view numbers = file.substr(place->begin + place->length);
   if (ByteCount(item, *shape) != numbers.size()) {

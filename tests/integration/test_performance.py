@@ -144,6 +144,32 @@ class PerformanceTest(DaemonTest):
         with self.assertRaises(TypeError):
             self.c.perform(step=STEP_S, channels=2)
 
+    def test_what_comes_outside_of_the_block_is_refused(self):
+        sound = self.c.perform(step=STEP_S)
+        with self.assert_refused("INVALID_STREAM"):
+            sound.step()
+        with sound:
+            for act in (lambda: sound.move_microphone(-1, ABOVE), lambda: sound.remove(-1)):
+                with self.assertRaises(ValueError):
+                    act()
+            for act in (lambda: sound.add(None), lambda: sound.reset([1.5])):
+                with self.assertRaises((TypeError, ValueError)):
+                    act()
+            sound.step()
+        for act in (sound.step, sound.reset):
+            with self.assert_refused("CONTACT_STREAM_ENDED"):
+                act()
+
+        async def give_up():
+            async with carillon.aio.connect(self.daemon.server) as c, c.perform(step=STEP_S) as sound:
+                with self.assertRaises(asyncio.TimeoutError):
+                    await asyncio.wait_for(sound.step(), 1e-9)
+                for _ in range(2):
+                    with self.assert_refused("CONTACT_STREAM_ENDED"):
+                        await sound.step()
+
+        asyncio.run(give_up())
+
     def test_contacts_for_which_a_step_has_no_place_are_rejected_at_once(self):
         sound = self.begin()
         most = 8 * 64

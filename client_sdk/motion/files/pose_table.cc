@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "client_sdk/interchange/npy_array.h"
 #include "client_sdk/interchange/zip_archive.h"
 #include "client_sdk/motion/files/motion_scene.h"
@@ -87,11 +88,37 @@ class PoseTextReader {
   }
 
   absl::StatusOr<MotionScene> Take() {
-    RETURN_IF_ERROR(SetTimes(path_, times_, scene_.motion));
+    for (size_t body = 0; body < times_.size(); ++body) {
+      RETURN_IF_ERROR(CheckComplete(scene_.motion.bodies[body].name, times_[body]));
+    }
+    std::vector<double> times;
+    for (const auto& [t, row] : first_rows_) times.push_back(t);
+    RETURN_IF_ERROR(SetTimes(path_, times, scene_.motion));
     return std::move(scene_);
   }
 
  private:
+  /// The line and the body of a pose.
+  struct Row {
+    size_t line = 0;
+    std::string body;
+  };
+
+  /// Returns a refusal that names the first time at which a body has no pose, if there is one.
+  absl::Status CheckComplete(const std::string& name, const std::vector<double>& times) const {
+    size_t k = 0;
+    for (const auto& [t, row] : first_rows_) {
+      if (k < times.size() && times[k] == t) {
+        ++k;
+        continue;
+      }
+      return Malformed(
+          path_, absl::StrCat(name, " has no pose at ", t, " s, when line ", row.line,
+                              " has one of ", row.body, ": each body needs one pose at each time"));
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status ReadNames(const std::vector<std::string>& cells) {
     for (size_t i = 0; i < kColumns.size(); ++i) {
       const auto same = [&](const std::string& cell) {
@@ -112,7 +139,8 @@ class PoseTextReader {
   absl::Status ReadPose(const std::vector<std::string>& cells) {
     double t = 0;
     std::array<double, 7> x{};
-    bool good = cells.size() == column_count_ && absl::SimpleAtod(cells[place_[0]], &t);
+    bool good =
+        cells.size() == column_count_ && absl::SimpleAtod(cells[place_[0]], &t) && std::isfinite(t);
     for (size_t i = 0; i < x.size() && good; ++i) {
       good = absl::SimpleAtod(cells[place_[i + 2]], &x[i]) && std::isfinite(x[i]);
     }
@@ -122,17 +150,20 @@ class PoseTextReader {
                                     absl::StrJoin(kColumns, ","),
                                     ": fill gaps, or cut the time in which a body is not seen"));
     }
-    const auto [at, is_new] = bodies_.try_emplace(cells[place_[1]], scene_.motion.bodies.size());
-    if (is_new) scene_.motion.bodies.emplace_back().name = at->first;
-    std::vector<BodyPose>& poses = scene_.motion.bodies[at->second].poses;
-    const size_t frame = poses.size();
-    if (frame == times_.size() && (frame == 0 || t > times_.back())) times_.push_back(t);
-    if (frame == times_.size() || times_[frame] != t) {
+    const auto [at, is_new] = bodies_.try_emplace(cells[place_[1]], times_.size());
+    if (is_new) {
+      scene_.motion.bodies.emplace_back().name = at->first;
+      times_.emplace_back();
+    }
+    std::vector<double>& times = times_[at->second];
+    if (!times.empty() && t <= times.back()) {
       return Malformed(
           path_, absl::StrCat("line ", line_number_, " has ", at->first, " at ", t,
                               " s: each body needs one pose at each time, in the order of times"));
     }
-    poses.push_back(PoseOf(x.data(), x.data() + 3));
+    times.push_back(t);
+    first_rows_.try_emplace(t, Row{line_number_, at->first});
+    scene_.motion.bodies[at->second].poses.push_back(PoseOf(x.data(), x.data() + 3));
     return absl::OkStatus();
   }
 
@@ -141,7 +172,8 @@ class PoseTextReader {
   bool first_ = true;  ///< no line with text was read
   std::array<size_t, kColumns.size()> place_;
   std::map<std::string, size_t> bodies_;
-  std::vector<double> times_;
+  std::vector<std::vector<double>> times_;  ///< of each body
+  std::map<double, Row> first_rows_;        ///< the first of each time
   MotionScene scene_;
 };
 
@@ -238,7 +270,11 @@ void FixStill(MovingBody& body) {
 absl::StatusOr<MotionScene> ReadPoseTable(const std::string& path) {
   absl::StatusOr<MotionScene> scene =
       absl::EndsWithIgnoreCase(path, ".npz") ? ReadNpz(path) : ReadCsv(path);
-  if (!scene.ok()) return scene;
+  if (!scene.ok()) {
+    const v1::ErrorInfo info = ToErrorInfo(scene.status());
+    if (info.reason() != "MODEL_FILE_MALFORMED") return scene;
+    return Malformed(path, absl::StripPrefix(info.message(), absl::StrCat(path, " ")));
+  }
   scene->bodies.resize(scene->motion.bodies.size());
   for (MovingBody& body : scene->motion.bodies) FixStill(body);
   return scene;

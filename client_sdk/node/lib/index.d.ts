@@ -74,6 +74,8 @@ export class Performance {
   readonly sampleRateHz: number;
   /** Seconds from a contact to its sound. */
   readonly latency: number;
+  /** What was probably not meant about the contacts, after `close`. */
+  readonly warnings: Warning[];
   /** Adds an object before the contacts of the next step, by default to all environments. Returns its handle. */
   add(model: Model | string, settings?: {
     environments?: number | Iterable<number>; material?: Material; size?: number; gain?: number; pose?: Pose;

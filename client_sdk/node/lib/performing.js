@@ -45,6 +45,8 @@ class Performance {
     this.handle = 0;
     this.rejectedCount = 0;
     this.paperCount = 0;
+    this.warnings = [];
+    this.isClosed = false;
   }
 
   async begin() {
@@ -85,8 +87,16 @@ class Performance {
 
   /** Sends a request, and returns the first message of its answer. */
   ask(request) {
-    this.call.write(request);
+    this.send(request);
     return this.receive();
+  }
+
+  send(request) {
+    if (this.isClosed) {
+      throw new CarillonError('CONTACT_STREAM_ENDED',
+        'this performance has been closed; begin another one by Client.perform');
+    }
+    this.call.write(request);
   }
 
   async receive() {
@@ -128,7 +138,7 @@ class Performance {
    * objects and microphones are where they were added.
    */
   reset(environments) {
-    this.call.write({ reset: { environments: this.indices(environments) } });
+    this.send({ reset: { environments: this.indices(environments) } });
   }
 
   /**
@@ -168,16 +178,20 @@ class Performance {
     return performed;
   }
 
-  /** Ends the performance, and warns of what is probably wrong with its contacts. Returns the warnings. */
+  /**
+   * Ends the performance, and warns of what is probably wrong with its contacts. Returns the warnings, which
+   * `warnings` keeps.
+   */
   async close() {
+    this.isClosed = true;
     this.client.openCalls.delete(this.call);
     this.call.on('error', () => {}); // which a step has thrown
     this.call.end();
     const { metadata } = await this.ended;
-    const warnings = metadata.get(SUMMARY_KEY)
+    this.warnings = metadata.get(SUMMARY_KEY)
       .flatMap((bytes) => message('RenderSummary').deserialize(bytes).warnings);
-    warnOfContacts(warnings);
-    return warnings;
+    warnOfContacts(this.warnings);
+    return this.warnings;
   }
 
   [util.inspect.custom]() {

@@ -274,6 +274,8 @@ test('a performance gives the samples of each step, the same again after a reset
   const far = { ...blow, objects: slow.add(model), points: [[9, 9, 9]], environments: [0] };
   await slow.step({ impacts: far });
   assert.deepEqual((await slow.close()).map(({ id, count }) => [id, count]), [['POINTS_DISTANT', 1]]);
+  assert.deepEqual(slow.warnings.map(({ id }) => id), ['POINTS_DISTANT']);
+  await assert.rejects(slow.step(), { reason: 'CONTACT_STREAM_ENDED' });
   assert.deepEqual(await sound.close(), []);
 });
 

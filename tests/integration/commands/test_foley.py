@@ -219,17 +219,20 @@ class FoleyTest(DaemonTest):
         out = ("--trace", self.folder / "none.contacts")
         rows = [(k / 60, name, 0, 0, 1, 1, 0, 0, 0) for k in range(10) for name in ("Bar", "Rod")]
         empty, nan = (0.05, "Bar", "", "", "", 1, 0, 0, 0), (0.05, "Bar", "NaN", 0, 1, 1, 0, 0, 0)
-        for name, instead, line in (("gap", [], 9), ("empty", [empty], 8), ("nan", [nan], 8),
-                                    ("twice", [rows[6]] * 2, 9)):
+        for name, instead, words in (("gap", [], "Bar has no pose at 0.05 s, when line 8 "),
+                                     ("empty", [empty], "line 8 "), ("nan", [nan], "line 8 "),
+                                     ("twice", [rows[6]] * 2, "line 9 ")):
             wrong = [*rows[:6], *instead, *rows[7:]]
             with self.subTest(name):
                 self.write_poses(f"{name}.csv", wrong)
-                self.refused("MOTION_MALFORMED", self.table(f"{name}.csv", *out, check=False), f"line {line} ")
+                self.refused("MOTION_MALFORMED", self.table(f"{name}.csv", *out, check=False), words)
         self.write_poses("names.csv", rows, "time,body,x,y,z,qw,qx,qy,qz")
         self.refused("MOTION_MALFORMED", self.table("names.csv", *out, check=False), "the column t ")
         arrays = dict(numpy.load(self.folder / "fall.npz"))
         numpy.savez(self.folder / "by_body.npz", **{**arrays, "positions": arrays["positions"].swapaxes(0, 1)})
         self.refused("MOTION_MALFORMED", self.table("by_body.npz", *out, check=False), "positions must be ")
+        numpy.savez(self.folder / "objects.npz", **{**arrays, "times": arrays["times"].astype(object)})
+        self.refused("MOTION_MALFORMED", self.table("objects.npz", *out, check=False), "times")
 
     def test_a_mass_of_the_file_scales_the_impulse(self):
         write_gltf(self.folder / "heavy.glb", mass=2 * MASS_KG)
@@ -400,6 +403,10 @@ class FoleyTest(DaemonTest):
         self.assertLess(without_friction.unexplained, 1e-6)
         with self.assert_refused("MOTION_WITHOUT_CONTACT"):
             self.python_contacts()
+        for bodies, poses in ((["Bar", "Rod"], ["Bar"]), (["Bar"], ["Bar", "Rod"])):
+            with self.assertRaisesRegex(ValueError, "'Rod'"):
+                carillon.motion.contacts({name: carillon.motion.Body("bar.obj") for name in bodies}, [0, 1],
+                                         {name: ([(0, 0, 0)] * 2, [(1, 0, 0, 0)] * 2) for name in poses})
         with self.assertRaises(carillon.CarillonError) as refused:
             self.python_contacts(stretch=numpy.nan, floor=0)
         self.assertNotIn(".npz", refused.exception.message)

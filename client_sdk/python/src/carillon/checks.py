@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import operator
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, NoReturn, Optional
 
@@ -133,6 +134,22 @@ def three(values: Any, name: str, meaning: str) -> numpy.ndarray:
     if array.size != 3:
         refuse(values, name, f"three numbers: x, y, z, {meaning}")
     return array.reshape(3)
+
+
+def integer(value: Any, name: str, wanted: str) -> int:
+    """Converts to an integer. Raises TypeError that shows what is none."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        refuse(value, name, wanted, TypeError)
+
+
+def index(value: Any, name: str, wanted: str) -> int:
+    """Converts to an integer of 32 bits. Raises ValueError that shows one that is negative or too large."""
+    number = integer(value, name, wanted)
+    if not 0 <= number <= MOST_OF_32_BITS:
+        refuse(value, name, wanted)
+    return number
 
 
 def whole_numbers(values: numpy.ndarray, name: str, wanted: str) -> numpy.ndarray:

@@ -66,8 +66,8 @@ def to_radiation(name: Optional[Radiation]) -> radiation_pb2.RadiationModel:
 def named(model: ModelLike | str, given: Optional[Material]) -> tuple[str, Optional[material_pb2.Material]]:
     """Returns the name of a model, and the material to sound with: the one given, or else the one that the model was
     asked for with. None leaves the choice to the daemon, which remembers it, too."""
-    name = model if isinstance(model, str) else model.name
-    if not name:
+    name = model if isinstance(model, str) else getattr(model, "name", None)
+    if not isinstance(name, str) or not name:
         checks.refuse(model, "the model", "a Model, or its name")
     chosen = given if given is not None or isinstance(model, str) else model.material
     return name, None if chosen is None else to_message(chosen)

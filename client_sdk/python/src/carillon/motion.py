@@ -55,6 +55,9 @@ def contacts(bodies: Mapping[str, Body], times: Sequence[float], poses: Mapping[
     proto/errors.md, such as MOTION_UNEXPLAINED; with `force` only if nothing can be computed. Needs NumPy."""
     import numpy
     names = list(bodies)
+    for name in sorted(bodies.keys() ^ poses.keys()):
+        raise ValueError(f"{name!r} is in {'bodies' if name in bodies else 'poses'} alone; each body needs its poses, "
+                         "and all poses need their body")
     words: list[str] = ["--gravity", ",".join(map(str, gravity))]
     with tempfile.TemporaryDirectory(prefix="carillon-") as name:
         folder = pathlib.Path(name)

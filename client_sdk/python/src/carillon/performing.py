@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import operator
 import queue
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Optional, TypeVar, Union
@@ -24,6 +23,8 @@ Environments = Union[None, int, Iterable[int]]
 # The trailing metadata in which the daemon tells of warnings.
 SUMMARY_KEY = "carillon-summary-bin"
 ENVIRONMENT = "the index of an environment, a whole number from 0"
+MICROPHONE = "the index of a microphone, a whole number from 0"
+OBJECT = "the handle of an object, a whole number"
 
 
 @dataclasses.dataclass
@@ -39,7 +40,7 @@ class Microphone:
 
     def message(self) -> performance_pb2.Microphone:
         return performance_pb2.Microphone(kind=self.kind, pose=contacts.to_pose(self.at, "at"),
-                                          object=0 if self.on is None else operator.index(self.on))
+                                          object=0 if self.on is None else checks.index(self.on, "on", OBJECT))
 
 
 class Omni(Microphone):
@@ -142,6 +143,7 @@ class PerformanceCalls(Block):
         self._handle = 0
         self._rejected_count = self._paper_count = 0
         self._call: Any = None
+        self._is_left = False
         self.warnings: list[warning_pb2.Warning] = []
         self.environment_count: int = max(settings.environment_count, 1)
         self.sample_rate_hz = 0
@@ -172,12 +174,14 @@ class PerformanceCalls(Block):
     def remove(self, item: Any, environments: Environments = None) -> None:
         """Removes an object from the environments, by default from all, at the next step. Its sound fades out within
         10 ms."""
-        self._next.removed_objects.add(object=operator.index(item), environments=self._indices(environments))
+        handle = checks.index(item, "the object", OBJECT)
+        self._next.removed_objects.add(object=handle, environments=self._indices(environments))
 
     def move_microphone(self, microphone: int, pose: PoseLike, environments: Environments = None) -> None:
         """Moves a microphone, which its index names, in the environments, by default in all, to its pose at the end of
         the next step."""
         to = contacts.to_pose(pose, "pose")
+        microphone = checks.index(microphone, "microphone", MICROPHONE)
         poses = self._next.microphone_poses
         for index in self._indices(environments) or range(self.environment_count):
             poses.microphone.append(microphone)
@@ -262,7 +266,7 @@ class PerformanceCalls(Block):
                 raise ValueError(f"environments is a mask of {len(given)}, but the performance has "
                                  f"{self.environment_count}")
             return [index for index, is_meant in enumerate(given) if is_meant]
-        indices = [operator.index(item) for item in given]
+        indices = [checks.integer(item, "an entry of environments", ENVIRONMENT) for item in given]
         for index in indices:
             self._check(index)
         if len(set(indices)) < len(indices):
@@ -288,8 +292,21 @@ class PerformanceCalls(Block):
         await self._send(request)
         return await self._receive()
 
+    def _refuse_outside(self) -> None:
+        """Refuses to send before the block or after it."""
+        if self._call is None:
+            raise errors.CarillonError("INVALID_STREAM", "this performance has not begun: use it as a context manager, "
+                                       "and take its steps within the block")
+        if self._is_left:
+            raise _ended("its block has been left")
+
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {checks.counted(self.environment_count, 'environment')}>"
+
+
+def _ended(why: str) -> errors.CarillonError:
+    return errors.CarillonError("CONTACT_STREAM_ENDED", f"this performance has ended, because {why}; begin another one "
+                                "by Client.perform")
 
 
 def _fill(step: performance_pb2.PerformStep, frame: int, reported: Optional[Contacts], impacts: Optional[Impacts],
@@ -323,6 +340,7 @@ class Performance(BlockingBlock, PerformanceCalls):
         self._call = self._client.audio_stub.Perform(requests)
 
     async def _send(self, request: performance_pb2.PerformRequest) -> None:
+        self._refuse_outside()
         if not self._call.is_active():
             await self._receive()  # raises the error that has ended the call
         self._requests.put(request)
@@ -332,6 +350,7 @@ class Performance(BlockingBlock, PerformanceCalls):
             return next(self._call)
 
     async def _leave(self, kind: Optional[type[BaseException]]) -> None:
+        self._is_left = True
         self._requests.put(None)
         if kind is not None:
             self._call.cancel()
@@ -349,18 +368,23 @@ class AsyncPerformance(AwaitedBlock, PerformanceCalls):
         self._call = self._client.audio_stub.Perform()
 
     async def _send(self, request: performance_pb2.PerformRequest) -> None:
+        self._refuse_outside()
+        if self._call.cancelled():
+            raise _ended("a step that was awaited has been cancelled, such as by asyncio.wait_for")
+        if self._call.done():
+            await self._receive()  # raises the error that has ended the call
         with errors.translated(self._client.server):
             await self._call.write(request)
 
     async def _receive(self) -> performance_pb2.PerformResponse:
         with errors.translated(self._client.server):
             answer = await self._call.read()
-            if not isinstance(answer, performance_pb2.PerformResponse):  # the call has ended, and its end says why
-                await self._call
-                raise errors.CarillonError("CONTACT_STREAM_ENDED", "the daemon has ended the performance")
+            if not isinstance(answer, performance_pb2.PerformResponse):
+                raise _ended("the daemon has ended it")
             return answer
 
     async def _leave(self, kind: Optional[type[BaseException]]) -> None:
+        self._is_left = True
         if kind is not None:
             self._call.cancel()
             return
