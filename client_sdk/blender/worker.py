@@ -21,8 +21,8 @@ FEW = 10
 ADVICE = {
     "SURFACE_OPEN": "the surface is not closed: close the mesh, or tick Repair in the physics properties, or give it "
                     "the material none",
-    "MESH_SEVERAL_PIECES": "its surface has parts that do not touch: let them overlap by a millimetre, and unite them by "
-                           "a Boolean modifier (the parts of a Compound Parent are united by the bake), give those that "
+    "MESH_SEVERAL_PIECES": "its surface has parts that do not touch: let them overlap by a millimetre, and unite them "
+                           "by a Boolean modifier (the bake unites the parts of a Compound Parent), give those that "
                            "are only there to collide the material none, or separate them into bodies of their own",
     "NO_MODE_IN_BAND": "too small or too stiff to be heard: nothing else has a material, so that nothing sounds",
     "NO_MOTION": "nothing that takes part moves: give what moves a rigid body or a material",
@@ -74,8 +74,9 @@ def _check_materials(found):
         raise Fault("UNKNOWN_MATERIAL", f"{missing}: choose one of the list", unknown)
     if not any(material not in ("", "none") for material in chosen.values()):
         unheard = "; ".join(f"{names}: {why}" for names, why in bodies.unheard(bpy.context.scene).items())
-        raise Fault("NO_MATERIAL", unheard or "no object has a material of Carillon: choose one in Physics properties > "
-                                              "Carillon, or give the object a Blender material of that name")
+        raise Fault("NO_MATERIAL", unheard or
+                    "no object has a material of Carillon: choose one in Physics properties > Carillon, or give the "
+                    "object a Blender material of that name")
 
 
 def _causes(scene, found, name, reason):

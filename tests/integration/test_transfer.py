@@ -127,7 +127,8 @@ class TransferTest(ScratchTest):
 
         def heard(performance):
             performance.reset()
-            return performance.step(impacts=carillon.Impacts(1, [meshes.BAR_SIZE], [(0, 0.3e-3, -1e-3)], durations=0))[0]
+            blow = carillon.Impacts(1, [meshes.BAR_SIZE], [(0, 0.3e-3, -1e-3)], durations=0)
+            return performance.step(impacts=blow)[0]
 
         with carillon.connect(self.daemon.server) as c:
             with c.perform(step=0.1, microphones=[carillon.Omni()] * 2) as performance:

@@ -363,7 +363,8 @@ class FoleyTest(DaemonTest):
         self.refused("MOTION_WITHOUT_CONTACT", flight)
         self.assertLess(float(re.search(r"unexplained (\S+) %", flight.stderr)[1]), 0.1)
         for floor_m in (-0.02, -0.1, -1):
-            self.refused("MOTION_WITHOUT_CONTACT", self.table("fall.csv", "--floor", floor_m, *out, check=False), "floor")
+            low = self.table("fall.csv", "--floor", floor_m, *out, check=False)
+            self.refused("MOTION_WITHOUT_CONTACT", low, "floor")
         self.write_poses("still.csv", [(k / 60, "Bar", 0, 0, 1, 1, 0, 0, 0) for k in range(40)])
         self.refused("NO_MOTION", self.table("still.csv", "--floor", 0, *out, check=False), "no body moves")
         # By a hand that the file does not have.

@@ -56,7 +56,8 @@ def bake(scene):
 
 def strips(scene):
     return [{"name": strip.name, "channel": strip.channel, "start": strip.frame_start, "mute": strip.mute,
-             "frames": strip.frame_final_duration, "volume": strip.volume, "path": bpy.path.abspath(strip.sound.filepath)}
+             "frames": strip.frame_final_duration, "volume": strip.volume,
+             "path": bpy.path.abspath(strip.sound.filepath)}
             for strip in scene.sequence_editor.sequences]
 
 
