@@ -11,6 +11,7 @@
 #include "server/base/mutex.h"
 #include "server/decomposition/active_jobs.h"
 #include "server/decomposition/job/executor.h"
+#include "server/decomposition/job/wanted_job.h"
 #include "server/decomposition/job_events.h"
 #include "server/decomposition/job_journal.h"
 #include "server/decomposition/job_wishes.h"
