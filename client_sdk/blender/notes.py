@@ -85,12 +85,14 @@ def of_sound(scene, folder, figures, jobs):
         lines.append("warning: without Radiation, levels are not physical: a body may be too loud or too soft beside "
                      "another")
     whole = _peak(folder / "sound.wav")
-    for stem in sorted((folder / "stems").glob("*.wav")):
-        share = _peak(stem) / whole if whole > 0 else 1
+    if whole == 0:
+        lines.append("warning: the sound is silent: nothing strikes what has a material")
+    for stem in sorted((folder / "stems").glob("*.wav")) if whole else ():
+        share = _peak(stem) / whole
         if share < INAUDIBLE:
-            by = f"{-20 * numpy.log10(share):.0f} dB below" if share > 0 else "nothing beside"
-            lines.append(f"warning: {re.sub(r'^[0-9]+-', '', stem.stem)}: cannot be heard, {by} the whole: small solid "
-                         "bodies have no audible tone; a Wall gives one")
+            why = (f"{-20 * numpy.log10(share):.0f} dB below the whole: small solid bodies have no audible tone; a "
+                   "Wall gives one" if share > 0 else "nothing strikes it in this range, or it is small and solid")
+            lines.append(f"warning: {re.sub(r'^[0-9]+-', '', stem.stem)}: cannot be heard: {why}")
     return lines + [f"{name}: {', '.join(filter(None, [nodes, f'{end - begin:.0f} s']))}"
                     for name, (begin, end, nodes) in jobs.items() if end - begin >= LEAST_S]
 

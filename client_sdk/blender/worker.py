@@ -122,6 +122,7 @@ def _in_blender(text, found):
     first, rate = found.shown
     text = re.sub(r"near ([\d.e-]+) s\b", lambda at: f"near frame {first + float(at[1]) * rate:.1f}", text)
     text = re.sub(r"--wall (\d[\d.e-]*)", r"a Wall of \1 m", text)
+    text = re.sub(r" \(--(floor|unit|mesh)\)", "", text)
     text = re.sub(r"^carillon: (?=try )", "", text, flags=re.MULTILINE)
     return re.sub(r"\(?--(wall|repair|material)\b\)?", lambda option: option[1].title(), text)
 

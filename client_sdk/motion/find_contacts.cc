@@ -149,7 +149,9 @@ void SetDeepest(const Motion& motion, const SearchBodies& bodies, FoundContacts&
     for (const size_t frame : {size_t{blow.frame}, size_t{blow.frame} + 1}) {
       const double depth_m = -std::min(Distance(motion, bodies, blow.a, blow.b, frame, 0),
                                        Distance(motion, bodies, blow.b, blow.a, frame, 0));
-      if (depth_m <= confidence.deepest_part * radius_m) continue;
+      // A step of a simulator ends anywhere on the way into a floor.
+      const double way_m = motion.frames_are_steps ? blow.approach_m_per_s * motion.frame_s : 0;
+      if (depth_m <= std::max(confidence.deepest_part * radius_m, way_m)) continue;
       confidence.deepest_part = depth_m / radius_m;
       confidence.deepest_m = depth_m;
       confidence.deepest_a = blow.a;

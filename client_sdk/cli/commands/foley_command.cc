@@ -222,7 +222,7 @@ absl::Status Judge(const FoleyScene& foley, const motion::FoundContacts& found, 
   if (is.deepest_part > kDeep) {
     warn_of_depth(is.deepest_a, is.deepest_b, is.deepest_m, "where they strike");
   }
-  if (is.unexplained > kDoubtful && is.unexplained <= kWrong) {
+  if (is.unexplained > kDoubtful && (force || is.unexplained <= kWrong)) {
     absl::FPrintF(stderr,
                   "warning: %.2g %% is unexplained, most of it of %s: the contacts there are less "
                   "sure\n",
