@@ -47,6 +47,8 @@ WantedJob WantedTransfer(const std::string& model, const v1::TransferHeader& sto
   v1::CreateModalModelRequest use;
   use.mutable_material()->set_density_kg_per_m3(kDensityKgPerM3);
   use.mutable_material()->set_young_pa(kDensityKgPerM3 * speed_m_per_s * speed_m_per_s);
+  use.mutable_material()->set_alpha1_s(0);
+  use.mutable_material()->set_alpha2_per_s(0);
   use.set_size(1);
   use.set_min_frequency_hz(20);
   use.mutable_transfer()->set_accuracy_db(stored.transfer_settings().accuracy_db());

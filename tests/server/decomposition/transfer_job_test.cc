@@ -132,6 +132,10 @@ TEST_F(TransferJobTest, IsComputedAnewForAModelThatReplacesItsOwn) {
   Submit();
   AwaitEnd(digest_);
   AwaitEnd(transfer_);
+  const WantedJob again =
+      WantedTransfer(digest_, database_->transfers().List(digest_)->front().header, "bowl");
+  EXPECT_EQ(again.digest, transfer_);
+  EXPECT_TRUE(ResolveMaterial(again.request.material()).ok()) << "the worker would refuse it";
   v1::Material& softer = *request_.mutable_material();
   softer = *ResolveMaterial(softer);
   softer.set_young_pa(softer.young_pa() / 4);
