@@ -12,10 +12,10 @@ namespace {
 
 using Index = Eigen::Index;
 
-/// Heights are known within this part of the distance of the plane from the centre of mass,
+/// Heights are known within this part of the distance of the plane from the centre of mass.
 constexpr double kTolerance = 0.01;
-/// and less well, by these parts of the height of a hop and of the way of a frame, because a step
-/// of a simulator moves the ends of a hop.
+/// The steps of a simulator move the ends of a hop, so that heights are less well known by these
+/// parts of the height of the hop and of the way that the body takes in a frame.
 constexpr double kPartOfHeight = 0.02, kPartOfFrame = 0.02;
 /// A body rests that would hop no higher than this part of the tolerance.
 constexpr double kLeastHeight = 0.15;
@@ -29,7 +29,7 @@ constexpr double kCostOfHop = 0.01;
 constexpr double kCoarse = 0.005, kFine = 1e-6;
 /// The number of frames that tell a flight, and a rest.
 constexpr size_t kFlightFrames = 2, kRestFrames = 4;
-/// Hops that follow each other in so many frames are sure to be told apart by their momenta.
+/// The momenta tell two hops apart that lie this number of frames apart.
 constexpr double kAloneFrames = 2.5;
 /// A change of an impulse costs this share of the energy that it would explain.
 constexpr double kKeep = 0.01;

@@ -38,7 +38,7 @@ constexpr double kDeep = 0.1;
 constexpr double kSunk = 0.1;
 /// Bodies that strike each other are less than this part of the smaller one's radius apart.
 constexpr double kApart = 0.5;
-/// A body that strikes something is at most so many times as long as its way.
+/// The longest side of a body that strikes something, in lengths of the way that the body takes.
 constexpr double kMostOfTravel = 10;
 /// Shares of unexplained momentum from which the masses or shapes are doubtful, and from which the
 /// contacts are wrong (docs/motion.md).

@@ -98,7 +98,7 @@ class PerformRows {
   };
 
   const v1::PerformStep& step_;
-  const size_t most_events_;  // of an environment
+  const size_t most_events_;  // that an environment takes in a step
   const StepRejections& rejections_;
   RowsByEnvironment poses_;
   RowsByEnvironment microphones_;

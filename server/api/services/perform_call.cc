@@ -86,7 +86,16 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
                                        std::max(std::thread::hardware_concurrency(), 1U),
                                        daemon_.bodies, &daemon_.database.transfers()));
     for (const v1::PerformedObject& object : first_objects_) RETURN_IF_ERROR(Add(object));
+    CountPaperCoupling();
     return absl::OkStatus();
+  }
+
+  /// Steps that add no object leave the number as it is.
+  void CountPaperCoupling() {
+    paper_count_ = 0;
+    for (size_t i = 0; i < performance_->environment_count(); ++i) {
+      paper_count_ += performance_->environment(i).paper_coupling_object_count();
+    }
   }
 
   absl::Status GrowMemory() {
@@ -134,6 +143,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
       NoteWarnings(environment);
       return environment.Reset();
     });
+    CountPaperCoupling();
   }
 
   /// Keeps the warnings about the contacts since the last reset. Of several with the same id the
@@ -171,6 +181,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
               [&](Environment& environment) { return environment.RemoveObject(removed.object()); });
     }
     for (const v1::PerformedObject& object : step.added_objects()) RETURN_IF_ERROR(Add(object));
+    if (added > 0) CountPaperCoupling();
     const PerformRows rows(step, *performance_, rejections_);
     samples_ = performance_->Step(
         [&rows](size_t environment, size_t microphone, ContactIntake& intake) {
@@ -241,11 +252,7 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
         AddImpact(static_cast<uint32_t>(i), impact, *message.mutable_impacts());
       }
     }
-    uint32_t paper_count = 0;
-    for (size_t i = 0; i < performance_->environment_count(); ++i) {
-      paper_count += performance_->environment(i).paper_coupling_object_count();
-    }
-    message.set_paper_coupling_object_count(paper_count);
+    message.set_paper_coupling_object_count(paper_count_);
     message.set_rejected_count(rejected_count_);
     message.clear_last_rejection();
     if (!last_rejection_.ok())
@@ -257,8 +264,9 @@ class PerformCall final : public ExchangeCall<v1::PerformRequest, v1::PerformRes
   std::unique_ptr<Performance> performance_;
   EnvironmentSettings settings_;
   size_t environment_count_ = 0;
-  google::protobuf::RepeatedPtrField<v1::PerformedObject> first_objects_;  // of the settings
+  google::protobuf::RepeatedPtrField<v1::PerformedObject> first_objects_;  // that the settings have
   size_t environment_bytes_ = 0;
+  uint32_t paper_count_ = 0;  // objects that sound by the paper's coupling
   bool begins_ = false;       // whether PerformanceBegun is to be sent
   bool has_stepped_ = false;  // whether a step has come
   bool answers_ = false;      // whether samples are to be sent

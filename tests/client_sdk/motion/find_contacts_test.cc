@@ -249,7 +249,7 @@ Fall Hops(const falls::Body& body, double rest_m, Hopping hopping, double frame_
   return fall;
 }
 
-/// What is found of hops from several heights, on average.
+/// The mean of what is found from hops that begin at several heights.
 struct FoundHops {
   double share = 0, false_share = 0, dt90_s = 0, vector_error = 0;
   double well_struck = 0;  ///< the share of the hops whose speeds are known to 5 %
